@@ -48,7 +48,7 @@ from IPython.display import Markdown
 from matplotlib.patches import Circle
 
 import szlib
-from szlib.control import barriers
+from szlib.control import HalfPlane, barrier, cbf_residual
 from szlib.workbook import figures
 from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters
 
@@ -351,20 +351,49 @@ is_euclidean = np.allclose(beside, [0.4, 0.3])
 record.check("beside the segment d is the Euclidean distance", is_euclidean, "0.4 m and 0.3 m", always=True)
 
 # %% [markdown]
+# ## Distance to an edge
+#
+# The robot drives on a platform, and the rails lie below $y = -1$ m. The forbidden side is a *half-plane*. Its distance is
+# the simplest one: with a point $\mathbf{p}$ on the edge and a unit vector $\mathbf{n}$ towards the allowed side,
+#
+# $$d = \mathbf{n}^\top (\mathbf{x} - \mathbf{p})$$
+#
+# Eq. 1 is the same for all three distances, so the controller of the library takes an edge as it takes walls and people.
+#
+# **What do you think?** The goal lies beyond the edge, at $y = -2$ m. Where does the robot stop?
+
+# %%
+edge = HalfPlane(point=(0.0, -1.0), normal=(0.0, 1.0))
+controller = szlib.MPCCBF(zone, obstacles=[edge], settings=settings)
+state = np.array([0.0, 0.0, 0.0, 0.0])
+for _ in range(150):
+    step = controller.step(state, goal=(2.0, -2.0))
+    state = step.predicted[1]  # nothing disturbs the robot: it is where the plan says
+print(f"after 15 s at y = {state[1]:.3f} m, where h = {step.h[0]:.3f} m; goal blocked: {step.goal_blocked}")
+
+# %% jupyter={"source_hidden": true}
+# Checks, and the answer
+record.check("the robot stops before the edge", step.h[0] >= -1e-6, f"h = {step.h[0]:.3f} m", always=True)
+Markdown(
+    f"<details><summary>Answer</summary>\n\nWhere its side is {settings.eps:g} m away from the edge: there $h = 0$. Beside the "
+    "goal it waits, and the step says that the goal cannot be reached.\n\n</details>"
+)
+
+# %% [markdown]
 # ## The same with the library
 #
-# `szlib.ellipse_distance`, `barriers.barrier` and `barriers.cbf_residual` are these formulas. The residual is
+# `szlib.ellipse_distance`, `control.barrier` and `control.cbf_residual` are these formulas. The residual is
 # positive where eq. 1 is obeyed:
 
 # %%
-h = float(barriers.barrier(szlib.ellipse_distance([2.5, 0.0], zone), settings.r_robot, settings.eps))
-h_next = float(barriers.barrier(szlib.ellipse_distance([2.45, 0.0], zone), settings.r_robot, settings.eps))
-print(f"h = {h:.3f} m, then {h_next:.3f} m: residual {barriers.cbf_residual(h_next, h, gamma):+.3f} m")
+h = float(barrier(szlib.ellipse_distance([2.5, 0.0], zone), settings.r_robot, settings.eps))
+h_next = float(barrier(szlib.ellipse_distance([2.45, 0.0], zone), settings.r_robot, settings.eps))
+print(f"h = {h:.3f} m, then {h_next:.3f} m: residual {cbf_residual(h_next, h, gamma):+.3f} m")
 
 # %% jupyter={"source_hidden": true}
 # Checks
 h = 1.0
-less, more = (barriers.cbf_residual(h - share * gamma * h, h, gamma) for share in (0.6, 1.2))
+less, more = (cbf_residual(h - share * gamma * h, h, gamma) for share in (0.6, 1.2))
 claim = f"from h = 1 m it may fall by {60 * gamma:.3g} cm in a step, and not by {120 * gamma:.3g} cm"
 record.check(claim, less > 0 > more, f"residuals {100 * less:+.1f} cm and {100 * more:+.1f} cm", always=True)
 record.key |= {"v limit at h = 1 m": settings.gamma * h / settings.dt}

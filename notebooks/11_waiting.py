@@ -54,7 +54,7 @@ from studies import chains, scenario_runs
 from studies.atlas import AtlasCell
 
 import szlib
-from szlib.control.acceleration_polygon import find_admissible_controls
+from szlib.control import find_admissible_controls
 from szlib.simulation.metrics import find_yielding_steps
 from szlib.simulation.strategies import classify_strategy
 from szlib.workbook import figures

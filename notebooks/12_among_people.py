@@ -16,8 +16,8 @@
 #
 # **Question.** What does a robot need besides the paper's controller where walls and many people are in its way?
 #
-# **Expectation.** A route around walls, and barriers that it may break, at a price, where people leave it no way. Then
-# it arrives sooner, and comes closer to people.
+# **Expectation.** A route around walls, and an order of what it gives up where people leave it no way: a zone before a
+# body, a body before a wall. Then it arrives sooner, and comes closer to people.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [11](11_waiting.ipynb) · next: [13 - The
@@ -26,7 +26,8 @@
 #
 # **Afterwards you can** choose settings for a robot among people and walls, and say where it will not
 # arrive. **Words.** *exact penalty*: a price on violations so high that none is paid where a solution
-# without violations exists.
+# without violations exists; *priority*: what a plan obeys first if it cannot obey all: walls, then bodies,
+# then zones, then decay.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook
@@ -56,13 +57,12 @@ record = NotebookRecord("12_among_people", globals())
 zone = record.cache.ellipse()
 paper = szlib.MPCSettings.paper()
 among = replace(szlib.MPCSettings.among_people(), time_limit=np.inf)
-crowding = among.crowding
 parameters(
     [
         ("paper: N, N_h", f"{paper.N}, {paper.N_h}", PAPER, "0.8 s ahead; gamma = 0.05: chapter 09"),
         ("among people: plan", f"{among.times[-1]:g} s", TUNED, f"{among.N} steps, a barrier on each"),
         ("among people: gamma", among.gamma, TUNED, "halved and doubled in notebook 29"),
-        ("price, gap", f"{crowding.price:g}, {crowding.gap:g} m", TUNED, "halved and doubled in notebook 29"),
+        ("decay_price, body_gap", f"{among.decay_price:g}, {among.body_gap:g} m", TUNED, "see notebook 29"),
     ]
 )
 
@@ -167,7 +167,7 @@ Markdown(
 )
 
 # %% [markdown]
-# ## What the robot may give up in a crowd
+# ## What the robot may give up, and in which order
 #
 # **A number first.** Five people come side by side, 2.2 m from one to the next. A body is 0.5 m wide, the robot
 # 1 m. Does it fit between two of them?
@@ -180,22 +180,26 @@ print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of mar
 
 # %% [markdown]
 # It fits between the bodies, and not between the zones. With *hard* barriers, which every plan must obey, there is no
-# way. What can be given up?
-# `among_people()` replaces the hard condition by one with a *slack* $s_k \ge 0$ that has a price:
+# way. What can be given up? A wall never: it stands still, and a robot that brakes in time need not touch it. A body only if
+# a wall is the alternative. So the conditions have *priorities*:
+#
+# | priority | condition | `MPCSettings()` | `among_people()` |
+# |---|---|---|---|
+# | 1, walls | the robot can still stop before every wall | by priority | by priority |
+# | 2, bodies | a gap to the bodies of people | 0 m, by priority | 0.2 m, by priority |
+# | 3, zones | $h \ge 0$ | by priority | follows from the price of decay |
+# | 4, decay | eq. 1 (how fast $h$ may fall) | by priority | has a price |
+#
+# *By priority*: every plan obeys the condition if it can. If it cannot, the condition is violated as little as those above it
+# allow. A *price* is different. It replaces eq. 1 by a condition with a *slack* $s_k \ge 0$:
 #
 # $$h_{k+1} \ge (1-\gamma)\, h_k - s_k, \qquad \text{cost} + p \sum_k s_k$$
 #
 # - $s_k$ is what is missing in step $k$ [m].
-# - $p$ is the price of a metre that is missing. With a high price the slack is 0 wherever that is possible (an
+# - $p$ is the price of a metre that is missing (`decay_price`). With a high price the slack is 0 wherever that is possible (an
 #   *exact penalty*). With a low price the robot buys a short cut through a zone.
 #
-# What may be bought depends on the number of people within 4 m of the robot:
-#
-# | people near | eq. 1 (how fast $h$ may fall) | $h \ge 0$ | a gap of 0.2 m to bodies |
-# |---|---|---|---|
-# | 0 or 1 | hard | hard | hard (follows from $h \ge 0$) |
-# | 2 or 3 | has a price | hard | hard (follows from $h \ge 0$) |
-# | 4 or more | has a price | has a price | hard |
+# Bodies and walls cannot be bought, for any number of people.
 #
 # **What do you think?** The five people walk at 1 m/s towards both robots. What does the robot with hard barriers
 # do?
@@ -219,13 +223,13 @@ record.figure(fig, "front")
 through, backs = fronts["among people"].metrics(), -fronts["paper"].states[:, 0].min()
 wide, entered = through["min_clearance"], through["violations"]
 what = "among people: the robot passes through the front, and keeps 0.2 m"
-record.check(what, through["success"] and wide >= crowding.gap - 1e-3, f"least gap {wide:.2f} m")
+record.check(what, through["success"] and wide >= among.body_gap - 1e-3, f"least gap {wide:.2f} m")
 what = "among people: each step that leads to h < 0 says that it is not safe"
 record.check(what, entered > 0 and through["unflagged_violations"] == 0, f"{entered} steps with h < 0")
 record.key |= {"front: least gap [m]": wide, "front: time to goal [s]": through["time_to_goal"]}
 Markdown(
     f"<details><summary>Answer</summary>\n\nIt backs away as fast as the people come, {backs:.0f} m in 40 s, and would go on. "
-    "The other one counts five people within 4 m, pays the price, and passes between two of them: h < 0 for "
+    "The other one pays the price, and passes between two of them: h < 0 for "
     f"{among.dt * entered:.1f} s, with a gap of {wide:.2f} m to the nearest body. It reports these steps as not "
     "safe.\n\n</details>"
 )
@@ -240,8 +244,13 @@ display(movie)
 # **Theory: when is a price exact?** For each hard constraint the solver computes a *multiplier* $\lambda$ (the "price" of
 # a row in chapter 08): how much the cost falls per metre by which the constraint gives way. If $p > \lambda$, giving way
 # costs more than it saves. Then the plan with a price is the plan with the hard constraint, wherever there is one
-# (Nocedal & Wright, *Numerical Optimization*, ch. 17). If no plan obeys all hard rows, this library gives these rows a
-# price as well, 100,000. In a crowd the price is 50: the robot enters a zone where waiting would cost more.
+# (Nocedal & Wright, *Numerical Optimization*, ch. 17). The price of `among_people()` is 100 for a metre in 0.1 s: the robot
+# enters a zone where waiting would cost more.
+#
+# **Why not a high price for walls?** Because prices are added up. Two people come along a wall. To give both 0.3 m more, the
+# robot would have to drive 0.5 m into the wall. If a metre has one price, that saves $2 \cdot 0.3 = 0.6$ m and costs 0.5 m: the
+# robot drives into the wall. A price that is high enough for two people is too low for ten. With priorities the number of
+# people does not matter. Notebook [21](deeper/21_feasibility.ipynb) shows such a wall.
 
 # %% [markdown]
 # ## Among 200 recorded people
@@ -388,7 +397,8 @@ pd.DataFrame({name: {key: describe(log) for key, log in logs.items()} for name, 
 # - **"`among_people()` is the safer one."** No. It arrives more often, and it enters zones that the paper's settings
 #   keep free. In a crowd it keeps only 0.2 m to the bodies of people, if they keep their velocity.
 # - **"`Step.safe = False` means a collision."** No. It means that the robot enters a zone, or that no plan obeys
-#   every hard row. `Step.explain()` says which.
+#   every hard row. `Step.explain()` says which. `Step.walls_safe` and `Step.passively_safe` are about collisions: that the robot
+#   can stop before every wall, and that it rests before somebody who keeps their velocity walks into it.
 # - **"The route keeps the robot away from people."** No. It is made from walls only. It may lead through a door that
 #   people block.
 
@@ -397,7 +407,7 @@ pd.DataFrame({name: {key: describe(log) for key, log in logs.items()} for name, 
 Markdown(
     f"**What we know now.** In one crowd `among_people()` took {sooner:.1f} s and the paper's settings {later:.1f} s; it paid with "
     f"h < 0 for {within['among people']:.1f} s, and each of these steps was flagged. A route leads out of dead ends, and "
-    "prices lead through crowds: in the place of 200 recorded people the goal was reached in "
+    "a price on eq. 1 leads through crowds: in the place of 200 recorded people the goal was reached in "
     f"{means.loc['among people', 'reached']:.1%} of the ways, with szlib's defaults in {means.loc['MPC-CBF', 'reached']:.0%}. The robot "
     "performs poorly around people who are faster than itself and do not see it, and it never arrives at a goal amid "
     "a standing group or behind a door that somebody blocks. Notebook 29 has people who react, and all the tables. In "

@@ -84,8 +84,9 @@ record.figure(fig, "still")
 #
 # **3. The paper's settings against `among_people()`.** Choose `MPCSettings.paper()`, and compare with
 # `MPCSettings.among_people()` in *corridor*.
-# <details><summary>What to expect</summary>Both are safe. The paper's robot meets the person head-on, and needs at least 2 s
-# longer; the other one plans 3 s ahead, and turns aside early.</details>
+# <details><summary>What to expect</summary>The paper's robot meets the person head-on, keeps the zone free, and needs at
+# least 2 s longer. The other one plans 3 s ahead, and turns aside early. It may pay for a short way through the edge of the
+# zone; then "not safe" appears. It touches nobody.</details>
 #
 # **4. A narrower corridor.** Drag the four ends of its walls to y = 1.8 and -1.8 m. Who goes first?
 # <details><summary>What to expect</summary>The two do not fit side by side. The robot goes back, out of the corridor, lets
@@ -100,8 +101,8 @@ record.figure(fig, "still")
 # it does not.</details>
 #
 # **7. A goal that is taken.** Scene *passing*: drag the goal close to the person, and then onto a wall in *corridor*.
-# <details><summary>What to expect</summary>The robot waits beside the person, and says that the goal cannot be reached. The
-# goal on the wall is refused: it goes back to where it was.</details>
+# <details><summary>What to expect</summary>The robot waits beside the person, and says that the goal cannot be reached. It
+# does the same beside the wall.</details>
 #
 # **8. Out of nowhere.** *corridor*, at 2.5 s: drag the person to 1.5 m ahead of the robot, with an arrow of 0 m/s. Then go back
 # on the time line, and try 2 m.
@@ -122,7 +123,8 @@ def try_scene(name, constructor="MPCSettings", at=0.0, edit=None, **settings):
     low = min(step.h.min() for step in steps)
     unsafe, back = sum(not step.safe for step in steps), min(step.scene.state[0] for step in steps)
     row = {"time": world.n * world.dt, "least h": low, "steps not safe": unsafe, "least x": back}
-    return row | {"arrived": world.arrived, "blocked": steps[-1].goal_blocked}
+    row |= {"arrived": world.arrived, "blocked": steps[-1].goal_blocked}
+    return row | {"gap": min(step.clearance[:, 0].min() for step in steps)}
 
 
 # %% [markdown]
@@ -143,6 +145,7 @@ tried = {
     "6: v_max = 0.4": try_scene("making_room", v_max=0.4),
     "6: v_max = 0.5": try_scene("making_room", v_max=0.5),
     "7: goal taken": try_scene("passing", edit={"goal": [0.8, 0.8]}),
+    "7: goal on a wall": try_scene("corridor", edit={"goal": [4.0, 2.2]}),
     "8: 1.5 m ahead": try_scene("corridor", at=2.5, edit=ahead[0]),
     "8: 2 m ahead": try_scene("corridor", at=2.5, edit=ahead[1]),
 }
@@ -155,12 +158,14 @@ time, low, unsafe, back = (table[name].astype(float) for name in table.columns[:
 held = {
     "1: sooner, but not safe": time.iloc[1] < time.iloc[0] - 2 and low.iloc[1] < 0 < unsafe.iloc[1],
     "2: foresight keeps h higher": low.iloc[2] > low.iloc[1] + 0.1,
-    "3: the paper's robot needs longer": time.iloc[3] > time.iloc[4] + 2 and not unsafe.iloc[3:5].any(),
+    "3: the paper's robot needs longer": time.iloc[3] > time.iloc[4] + 2 and not unsafe.iloc[3],
+    "3: both touch nobody": table["gap"].iloc[3:5].min() > 0,
     "4: the robot leaves the corridor": back.iloc[5] < -6 and low.iloc[5] >= 0 and table["arrived"].iloc[5],
     "5: not safe, and h stays above 0": unsafe.iloc[6] > 5 and low.iloc[6] > 0,
     "6: a slower robot is caught": low.iloc[7] < 0 <= low.iloc[8],
-    "7: the robot waits beside its goal": table["blocked"].iloc[9] and not table["arrived"].iloc[9],
-    "8: 1.5 m is too late, 2 m is not": low.iloc[10] < 0 <= low.iloc[11] and unsafe.iloc[11] > 0,
+    "7: the robot waits beside its goal": table["blocked"].iloc[9:11].all()
+    and not table["arrived"].iloc[9:11].any(),
+    "8: 1.5 m is too late, 2 m is not": low.iloc[11] < 0 <= low.iloc[12] and unsafe.iloc[12] > 0,
 }
 for what, holds in held.items() if record.cache.is_synthetic else ():
     record.check(what, bool(holds))

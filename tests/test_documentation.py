@@ -114,6 +114,10 @@ def described(module: str) -> Iterator[tuple[str, str, set[str], set[str]]]:
                 )
                 if not method.startswith("_") and inspect.isfunction(called):
                     text = inspect.getdoc(getattr(found, method)) or ""
+                    for owner, other in re.findall(r"`(\w+)\.(\w+)`", text):
+                        # parameters as of a method of the same module
+                        base = getattr(members.get(owner), other, None)
+                        text += f"\n{inspect.getdoc(base)}"
                     yield f"{name}.{method}", text, parameters(called), set()
         elif inspect.isfunction(inspect.unwrap(found) if callable(found) else found):
             yield name, inspect.getdoc(found) or "", parameters(found), set()

@@ -261,6 +261,25 @@ def test_each_way_into_the_package_loads_only_what_it_needs() -> None:
     assert "szlib.control.controller" in robot
 
 
+def test_a_robots_process_loads_no_tables_and_no_figures() -> None:
+    """One step of each controller, in a fresh process."""
+    (robot,) = loaded_after(
+        "import szlib\n"
+        "zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))\n"
+        "people, walls = [[2.0, 0.3, -0.5, 0.0]], [[(-5.0, 2.0), (5.0, 2.0)]]\n"
+        "edge = szlib.control.HalfPlane((0.0, -2.0), (0.0, 1.0))\n"
+        "settings = szlib.MPCSettings.among_people()\n"
+        "given = {'walls': walls, 'obstacles': [edge], 'settings': settings}\n"
+        "point = szlib.MPCCBF(zone, **given)\n"
+        "point.step((0, 0, 0, 0), (4, 0), people, ids=['a']).verify()\n"
+        "wheels = szlib.DifferentialDrive(zone, **given)\n"
+        "_ = wheels.step((0, 0, 0), (4, 0), people, ids=['a']).explain()"
+    )
+    assert "szlib.control.differential_drive" in robot and "casadi" in robot
+    heavy = {"pandas", "polars", "sklearn", "pyarrow", "matplotlib", "scipy.stats"}
+    assert heavy & robot == set()
+
+
 def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
     (loaded,) = loaded_after(
         "from szlib.workbook.cli import build_parser; build_parser()"

@@ -64,7 +64,7 @@ from studies.folds import fold_table
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
 import szlib
-from szlib.control.distances import compare_distances
+from szlib.control.verification import compare_distances
 from szlib.plaza.accuracy import true_kinds
 from szlib.workbook import figures, paper_sentences
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table

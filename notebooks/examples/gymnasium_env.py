@@ -19,10 +19,8 @@ import gymnasium
 import numpy as np
 
 import szlib
-from szlib.control.barriers import compute_h
 from szlib.control.controller import DoubleIntegrator
-from szlib.control.distances import walls_with_margins
-from szlib.control.person import as_ellipse, place_zone
+from szlib.control.people import as_ellipse
 from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED, UNAFFECTED, CrowdModel
 
 PEOPLE, WALLS, FAR = 5, 4, 50.0  # rows of each, and the largest number of an observation
@@ -61,7 +59,8 @@ class SocialEnv(gymnasium.Env):
         self.scenario = self.scenarios(world)
         zoned = tuple(replace(person, zone=person.zone or self.zone) for person in self.scenario.people)
         self.crowd = self.behaviour.start(replace(self.scenario, people=zoned), world)
-        self.wall_rows = walls_with_margins(self.scenario.walls, self.settings)
+        keeps_out = {"walls": self.scenario.walls, "obstacles": self.scenario.obstacles}
+        self.barriers = szlib.MPCCBF(self.zone, **keeps_out, settings=self.settings).barriers
         self.k, self.state, self.min_h = 0, self.robot.start(self.scenario.start), np.inf
         return self._look(), {"min_h": self.min_h, "world": world}
 
@@ -81,22 +80,19 @@ class SocialEnv(gymnasium.Env):
 
     def _look(self):
         """Take the people and barriers of now; return the observation."""
-        (x, y, vx, vy), s = self.state.tolist(), self.settings
-        self.people = [person for person in self.crowd(self.k * s.dt, self.state) if person is not None]
-        zones = [
-            place_zone(person, as_ellipse(person.zone or self.zone, s.zone_speed)) for person in self.people
-        ]
-        self.h = compute_h(x, y, zones, self.wall_rows, r_robot=s.r_robot, eps=s.eps)
+        at, velocity, dt = self.state[:2], self.state[2:], self.settings.dt
+        self.people = [person for person in self.crowd(self.k * dt, self.state) if person is not None]
+        self.h = self.barriers(at, self.people).tolist()
         self.min_h = min([self.min_h, *self.h])
-        n, at = len(self.people), np.array([x, y])
+        n = len(self.people)
         people = [(*(p.position - at), *p.velocity, h) for p, h in zip(self.people, self.h, strict=False)]
         people.sort(key=lambda row: hypot(*row[:2]))
-        walls = [(*(wall - at).ravel(), h) for wall, h in zip(self.scenario.walls, self.h[n:], strict=True)]
+        walls = [(*(wall - at).ravel(), h) for wall, h in zip(self.scenario.walls, self.h[n:], strict=False)]
         walls.sort(key=lambda row: row[4])
         rows = np.full((PEOPLE + WALLS, 5), FAR)
         for first, found in ((0, people[:PEOPLE]), (PEOPLE, walls[:WALLS])):
             rows[first : first + len(found)] = np.reshape(found, (-1, 5))
-        return np.clip(np.concatenate([(vx, vy), self.scenario.goal - at, rows.ravel()]), -FAR, FAR)
+        return np.clip(np.concatenate([velocity, self.scenario.goal - at, rows.ravel()]), -FAR, FAR)
 
 
 gymnasium.register("szlib/Social-v0", entry_point=SocialEnv)  # gymnasium.make("szlib/Social-v0", zone=...)

@@ -48,7 +48,7 @@ def run(tracks: str, walls: np.ndarray | None = None, seconds: float = 60.0, see
     data, disc = mujoco.MjData(model), model.geom("disc").id
     settings = szlib.MPCSettings.among_people(dt=DT, r_robot=RADIUS, v_max=0.8).with_gamma_rate(0.8)
     zone = szlib.reference_zone("grand-central-strangers").ellipse
-    drive = szlib.DifferentialDrive(zone, walls=walls, settings=settings, max_people=PLACES)
+    drive = szlib.DifferentialDrive(zone, walls=walls, settings=settings)
     known, count = (
         np.array([*goals[0], 0.0]),
         {"goals": 0, "steps": 0, "safe": 0, "contacts": 0, "unannounced": 0},

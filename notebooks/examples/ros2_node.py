@@ -27,7 +27,7 @@ class SocialDrive(Node):
             setattr(self, name, self.declare_parameter(name, value).value)
         self.zone_around, walls = szlib.SocialZone.load(self.zone), self.walls.split(";")
         self.own_walls = [np.reshape(w.split(), (2, 2)).astype(float) for w in walls if w.strip()]
-        settings = szlib.MPCSettings(r_robot=self.r_robot, v_max=self.v_max, lookahead=4.0)
+        settings = szlib.MPCSettings.among_people(r_robot=self.r_robot, v_max=self.v_max)
         self.drive = szlib.DifferentialDrive(self.zone_around, walls=self.own_walls, settings=settings)
         self.goal, self.stamps = None, {"odometry": -np.inf, "people": -np.inf}
         self.create_subscription(Odometry, "odom", self.on_odometry, 10)
@@ -61,7 +61,7 @@ class SocialDrive(Node):
             except szlib.SolverError as error:
                 self.goal = None
                 self.get_logger().error(f"the goal is dropped: {error}")
-        if step and (not step.safe or step.stuck or step.clock):
+        if step and (not step.safe or step.scene.goal_blocked or step.stuck or step.clock):
             self.warn(step.explain())
         self.publish(*(step.control.tolist() if step else (0.0, 0.0)))
         return step

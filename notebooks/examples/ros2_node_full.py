@@ -13,8 +13,8 @@ Parameters: `zone`, a file that `SocialZone.save` wrote; `walls`, "x1 y1 x2 y2; 
 of the walls, into which all messages are brought by TF (messages in another frame are ignored with a warning
 where TF does not know it at their time, or is not installed; velocities are only turned, so the frame of
 people should stand still); `stamped`, True for a base that wants TwistStamped; of the robot `r_robot` [m],
-`v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: the default of `DifferentialDrive`); `max_people`, the
-number to prepare for; `timeout` [s]; `costmap_size` and `costmap_resolution` [m].
+`v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: the default of `DifferentialDrive`); `timeout` [s];
+`costmap_size` and `costmap_resolution` [m].
 
 Watchdog: the node commands zero velocity, every dt, unless it has a goal, and odometry and people no older
 than `timeout` by their own stamps. Silence about people does not mean that nobody is there: a tracker that
@@ -47,7 +47,6 @@ DEFAULTS = ros2_node.DEFAULTS | {
     "stamped": False,
     "omega_max": 4.0,
     "ahead": 0.0,
-    "max_people": 10,
     "costmap_size": 8.0,
     "costmap_resolution": 0.1,
 }
@@ -69,7 +68,6 @@ class FullSocialDrive(ros2_node.SocialDrive):
             settings=self.drive.settings,
             omega_max=self.omega_max,
             ahead=self.ahead or None,
-            max_people=self.max_people,
         )
         self.transforms = tf2_ros and tf2_ros.Buffer()
         self.listener = tf2_ros and tf2_ros.TransformListener(self.transforms, self)

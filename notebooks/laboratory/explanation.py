@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 
 import szlib
-from szlib.control import AdmissibleControls, find_admissible_controls
-from szlib.control.acceleration_polygon import BarrierLimit
+from szlib.control import AdmissibleControls, BarrierLimit, find_admissible_controls
 from szlib.control.step import HOLDS
 from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
 
@@ -75,12 +74,17 @@ def _as_sentence(text: str) -> str:
 def _find_active(step: szlib.Step, found: AdmissibleControls) -> tuple[BarrierLimit, ...]:
     """The nearest limit of each person and wall on whose edge the control lies, at most `_MOST_NAMED`,
     persons first."""
-    control, nearest = shapely.Point(step.control), dict[tuple[str, int], BarrierLimit]()
+    control, nearest = shapely.Point(step.control), dict[int, BarrierLimit]()
     distances = [(shapely.LineString(limit.curve).distance(control), limit) for limit in found.limits]
     for distance, limit in sorted(distances, key=lambda each: each[0]):
         if distance <= _AT_LIMIT * step.scene.settings.a_max:
-            nearest.setdefault((limit.kind, limit.number), limit)
-    return tuple(sorted(list(nearest.values())[:_MOST_NAMED], key=lambda limit: limit.kind))
+            nearest.setdefault(limit.row, limit)
+    return tuple(sorted(list(nearest.values())[:_MOST_NAMED], key=lambda limit: limit.row))
+
+
+def name_limit(step: szlib.Step, limit: BarrierLimit) -> str:
+    """Whose `limit` it is, such as "wall 1"."""
+    return step.scene.name(limit.row).partition(" (")[0]
 
 
 def _describe_motion(step: szlib.Step) -> str:
@@ -102,17 +106,17 @@ def _describe_limits(step: szlib.Step, active: tuple[BarrierLimit, ...]) -> str:
     """The persons and walls at whose limit the control lies, and the rule that makes it a limit."""
     scene, s, texts = step.scene, step.scene.settings, list[str]()
     x, y, vx, vy = scene.state
-    gaps = np.array([scene.gaps(x, y), scene.gaps(x + s.dt * vx, y + s.dt * vy, s.dt)])  # now, and dt later
-    closing = -scene.spread(np.diff(gaps, axis=0)[0]) / s.dt
+    gaps = scene.barriers.gaps(
+        np.array([x, x + s.dt * vx]), np.array([y, y + s.dt * vy]), np.array([0.0, s.dt])
+    )
+    closing = -scene.spread(gaps[:, 1] - gaps[:, 0]) / s.dt
     for limit in active:
-        row = limit.number if limit.kind == "person" else len(scene.people) + limit.number
+        row = limit.row
         is_closing = float(closing[row]) >= _SLIGHT
         motion = f"comes closer at {closing[row]:.1f} m/s" if is_closing else "does not come closer"
         when = f", at its limit in {s.times[limit.k + 1]:.1f} s" if limit.k > 1 else ""
-        texts.append(f"{limit.kind} {limit.number} {motion} (h = {step.h[row]:.2f} m{when})")
-    first = active[0]
-    gamma = scene.barriers[first.number][-2] if first.kind == "person" else s.gamma
-    return f"{', '.join(texts)}, and h may shrink by at most {100 * gamma:g} % a step"
+        texts.append(f"{name_limit(step, limit)} {motion} (h = {step.h[row]:.2f} m{when})")
+    return f"{', '.join(texts)}, and h may shrink by at most {100 * s.gamma:g} % a step"
 
 
 def _describe_freedom(step: szlib.Step) -> str:
@@ -124,7 +128,7 @@ def _describe_freedom(step: szlib.Step) -> str:
         return "it is at its goal"
     if paid:
         names = " and ".join(f"person {i}" for i in paid[:_MOST_NAMED])
-        return f"in a crowd it may come nearer to {names} than gamma allows, at a price"
+        return f"it comes nearer to {names} than gamma allows, at a price"
     if hypot(*step.predicted[1, 2:]) >= s.v_max - _AT_LIMIT:
         return f"{s.v_max:g} m/s is its highest speed, and no person and no wall limits it"
     if max(abs(step.control)) >= s.a_max * (1 - _AT_LIMIT):

@@ -17,7 +17,7 @@ import szlib
 from szlib.checks import require
 from szlib.workbook.figures.movies import read_scripts, scene_layout, snapshot
 
-from .explanation import explain
+from .explanation import explain, name_limit
 from .world import CONSTRUCTORS, LIMITS, PRESETS, RobotOptions, World
 
 _MARGIN = 0.8  # around everything that can be dragged [m]
@@ -155,9 +155,7 @@ class Laboratory(anywidget.AnyWidget):
             part.exterior.coords for part in parts if part.geom_type == "Polygon" and not part.is_empty
         ]
         t, h, n = self.world.n * self.world.dt, step.h, len(people)
-        shown = snapshot(
-            t, np.array(scene.state), placed, scene.person_zones, step.predicted, h, step.fallback
-        )
+        shown = snapshot(t, np.array(scene.state), placed, scene.person_zones, step.predicted, h, step.status)
         return shown | {
             "h_people": round(float(h[:n].min()), 3) if n else None,
             "h_walls": round(float(h[n:].min()), 3) if len(h) > n else None,
@@ -166,8 +164,9 @@ class Laboratory(anywidget.AnyWidget):
             "a_max": scene.settings.a_max,
             "allowed": [np.round(corners, 3).tolist() for corners in allowed],
             "active": [
-                {"kind": limit.kind, "number": limit.number, "curve": limit.curve.round(3).tolist()}
+                {"kind": kind, "number": int(number), "curve": limit.curve.round(3).tolist()}
                 for limit in reasons.active
+                for kind, number in [name_limit(step, limit).rsplit(" ", 1)]
             ],
             "sentence": reasons.sentence,
             "safety": reasons.safety,

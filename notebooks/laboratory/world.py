@@ -111,7 +111,7 @@ class World:
 
     Raises
     ------
-    SolverError : a setting is out of range, or the goal lies too close to a wall.
+    SolverError : a setting is out of its range.
 
     Examples
     --------
@@ -199,7 +199,7 @@ class World:
 
         Raises
         ------
-        SolverError : a value is invalid, or the goal would lie too close to a wall. Then nothing has changed.
+        SolverError : a value is invalid. Then nothing has changed.
         """
         runs, n = self._runs, self.n
         changed: dict[str, Any] = {"people": _edit_people(self.people, people or {})}

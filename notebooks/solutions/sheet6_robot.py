@@ -175,4 +175,4 @@ judges.check("prediction", prediction)
 # | 3 | gamma depends on brake, speed and horizon: 6.1 and 6.2 with the numbers of that robot |
 # | 3 | the scenarios have one person who keeps their velocity; the corridor has others |
 # | 2 | measured first: speeds and sudden stops of people, delay of the sensors, the true brake |
-# | 2 | infeasible steps and h < 0 are told apart, and a fallback is named |
+# | 2 | infeasible steps are separated from h < 0, and the answer says what gives way first |

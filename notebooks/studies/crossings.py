@@ -26,7 +26,6 @@ from studies.committed import write_table
 import szlib
 from szlib.checks import Array
 from szlib.control.controller import Controller, advance
-from szlib.control.settings import Crowding
 from szlib.simulation.comparisons import CONTROLLERS
 from szlib.simulation.scenario import Scenario
 
@@ -147,7 +146,7 @@ def find_settings(controller: str, dt: float, a_max: float) -> szlib.MPCSettings
     if controller == OURS:
         limits |= {"grid": (1,) * 12} if dt == DT else {}  # 3 s
         among = szlib.MPCSettings.among_people
-        return among(crowding=Crowding(gap=0.25), **limits).with_gamma_rate(among().gamma_rate)
+        return among(body_gap=0.25, **limits).with_gamma_rate(among().gamma_rate)
     paper = szlib.MPCSettings.paper
     return paper(solver="sqp", **limits).with_gamma_rate(paper().gamma_rate)
 

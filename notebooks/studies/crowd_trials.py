@@ -28,16 +28,14 @@ from studies.claims import SITES
 from studies.committed import write_table
 
 import szlib
-from szlib.control.controller import Controller
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
 from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
 from szlib.simulation.crowds.walking_model import ModelFactory
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.monte_carlo import ControllerFactory
+from szlib.simulation.monte_carlo import ControllerFactory, make_mpc_cbf
 from szlib.simulation.replay import ReplacedWalker, Replays, find_replays
 from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
-from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.simulation.social_metrics import compute_replay_metrics
 
@@ -71,16 +69,6 @@ BY = ("crowd", "sees", "controller")
 PROBED = ("claimed_safe_steps", "path_efficiency")
 """Columns of the trial `PROBE` in the table of safety claims."""
 SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intruding", "nearest")
-
-
-@lru_cache
-def _without_walls(settings: szlib.MPCSettings) -> szlib.MPCCBF:
-    return szlib.MPCCBF(szlib.Ellipse((0.0, 0.0), (1.0, 1.0)), settings=settings)
-
-
-def reused(scenario: Scenario, settings: szlib.MPCSettings) -> Controller:
-    """One controller for all recorded crowds: people come and go, and each size is built once."""
-    return _without_walls(settings)
 
 
 def measure(log: SimulationLog) -> dict[str, float]:
@@ -198,7 +186,7 @@ def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
                 settings=settings,
                 worlds=made,
                 behaviour=made,
-                controller=reused if name.startswith("MPC") else factory,
+                controller=make_mpc_cbf if name.startswith("MPC") else factory,
                 measure=measure,
                 out=work,
                 n_jobs=1,

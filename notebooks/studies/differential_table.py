@@ -19,10 +19,10 @@ from studies.rollout_table import interval
 
 import szlib
 from szlib.checks import Array
-from szlib.control.barriers import ellipse_distance
 from szlib.control.differential_drive import Unicycle
-from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
+from szlib.control.obstacles import ellipse_distance
 from szlib.control.settings import TOLERANCE
+from szlib.control.verification import euclidean_to_ellipse, euclidean_to_segment
 from szlib.simulation.monte_carlo import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
@@ -43,7 +43,6 @@ def two_wheels(scenario: szlib.Scenario, settings: szlib.MPCSettings, omega_max:
         walls=scenario.walls,
         settings=settings,
         omega_max=omega_max,
-        max_people=len(scenario.people),
     )
     rng = np.random.default_rng([int(scenario.name.split()[1]), 3])
     drive.robot = Unicycle(rng.uniform(-np.pi, np.pi))

@@ -22,11 +22,12 @@ import numpy as np
 import pandas as pd
 from studies.claims import SITES
 from studies.committed import write_table
-from studies.crowd_trials import reused, zone_of
+from studies.crowd_trials import zone_of
 
 import szlib
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
+from szlib.simulation.monte_carlo import make_mpc_cbf
 from szlib.simulation.replay import TIME_FACTOR, ReplacedWalker, Replay, find_replays
 from szlib.simulation.social_metrics import REACHED, compute_replay_metrics
 from szlib.tracks.clock import TICKS_PER_SECOND
@@ -47,18 +48,10 @@ OURS = SETTINGS["among people"]
 def changed() -> dict[str, szlib.MPCSettings]:
     """The controller among people, with each number of it halved and doubled."""
     found = {"as it is": OURS}
-    for name, values in (("gamma", (0.04, 0.16)), ("jerk_weight", (4.0, 16.0))):
-        found |= {f"{name} {value:g}": replace(OURS, **{name: value}) for value in values}
-    crowding = (
-        ("price", (25, 100)),
-        ("radius", (2.8, 5.7)),
-        ("few", (1, 4)),
-        ("many", (2, 8)),
-        ("gap", (0.1, 0.4)),
-    )
-    for name, values in crowding:
-        for value in values:
-            found[f"{name} {value:g}"] = replace(OURS, crowding=replace(OURS.crowding, **{name: value}))
+    for name in ("gamma", "jerk_weight", "decay_price", "zone_price", "body_gap"):
+        for factor in (0.5, 2.0):
+            value = factor * getattr(OURS, name)
+            found[f"{name} {value:g}"] = replace(OURS, **{name: value})
     return found
 
 
@@ -116,7 +109,7 @@ def trials(
         elif name in CONTROLLERS:
             robot = CONTROLLERS[name](at.scenario, limited)
         else:
-            robot = reused(at.scenario, limited)
+            robot = make_mpc_cbf(at.scenario, limited)
         yield {"seed": seed} | measure(at, robot)
 
 

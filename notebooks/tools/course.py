@@ -175,8 +175,12 @@ GLOSSARY: dict[str, Word] = {
     "respect zone": Word(
         "the ellipse that careful people keep out of, compared with people who ignore each other", new=False
     ),
-    "fallback": Word(
-        "which of the controller's ways to a control was taken: warm, cold, kept, relaxed, braking"
+    "guard": Word(
+        "a check before a control is applied, that the robot can still stop before every wall", r"\bguard\b"
+    ),
+    "priority": Word(
+        "what a plan obeys first if it cannot obey all: walls, then bodies, then zones, then decay",
+        r"\bpriorit(y|ies)\b",
     ),
     "slack": Word("by how much a row is violated"),
     "social force": Word("people who are pushed by others and by walls, and drawn to their goal", new=False),

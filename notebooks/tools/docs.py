@@ -37,7 +37,9 @@ CODE = re.compile(r"<code>(?:szlib\.)?(?:[a-z]+\.)?((?:\w+\.)?\w+)(?:\([^<]*\))?
 def list_exports(module):
     """What a package imports, or another module defines: its public names."""
     home = "szlib" if hasattr(module, "__path__") else module.__name__
-    public = ((n, value) for n, value in vars(module).items() if n[0] != "_" and not inspect.ismodule(value))
+    # a lazy package lists its names by `dir`
+    named = ((n, getattr(module, n)) for n in dir(module) if n[0] != "_")
+    public = ((n, value) for n, value in named if not inspect.ismodule(value))
     return {name: value for name, value in public if getattr(value, "__module__", home).startswith(home)}
 
 

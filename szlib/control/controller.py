@@ -1,16 +1,22 @@
-"""What every controller has in common: the base class `Controller`, and the robots that controllers drive."""
+"""What every controller has in common: the class `Controller`, the robots, and the clock of the steps."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from copy import deepcopy
+from math import ceil, dist, hypot, inf
+from statistics import median_low
+from time import perf_counter
 from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array
-from .person import Person
+from ..checks import Array, require
+from ..errors import SolverError
+from .obstacles import Path
+from .people import Person, check_time
 from .settings import MPCSettings
 
 
@@ -53,6 +59,43 @@ def advance(state: Array, control: Array, dt: float) -> Array:
     )
 
 
+_MOST_PIECES = 64  # in which the way of a braking robot is looked at
+ROUNDING = 1e-9  # a slower robot is at rest, but for rounding [m/s]
+
+
+def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -> Path:
+    """Where a double integrator goes that holds a control for dt, and then brakes as hard as it can.
+
+    It brakes on a straight line, to rest; each part of this line is the braking path of its state.
+
+    Parameters
+    ----------
+    state : (x, y, vx, vy) [m, m/s].
+    control : (ax, ay) [m/s2].
+    s : settings: dt and a_max.
+    """
+    (x, y, vx, vy), (ax, ay), dt = state, control.tolist(), s.dt
+    dx, dy, bow = dt * vx + dt**2 / 2 * ax, dt * vy + dt**2 / 2 * ay, dt**2 / 8
+    points, vx, vy = [(x, y), (x + dx, y + dy)], vx + dt * ax, vy + dt * ay
+    x, y, fastest, way = x + dx, y + dy, max(abs(vx), abs(vy)), 0.0
+    steps = ceil(fastest / s.a_max / dt)
+    piece = dt * max(1, ceil(steps / _MOST_PIECES))
+    speed, times = fastest, [0.0, dt]
+    while speed > ROUNDING:
+        slower = max(0.0, speed - s.a_max * piece)
+        way += piece * (speed + slower) / 2 / fastest
+        points.append((x + way * vx, y + way * vy))
+        times.append(times[-1] + piece)
+        speed = slower
+    bows, asides = np.zeros((2, len(points) - 1))
+    bows[:] = 2**0.5 * s.a_max * piece**2 / 8
+    bows[0] = hypot(ax, ay) * bow
+    asides[0] = bow * abs(dx * ay - dy * ax) / (hypot(dx, dy) or 1.0)
+    return Path(
+        np.array(points), np.linspace(0.0, dt * len(bows), len(points)), bows, asides
+    )
+
+
 class DoubleIntegrator:
     """The robot of the paper: (x, y, vx, vy), driven by (ax, ay) (eq. 8); its own state is its disc's."""
 
@@ -81,8 +124,8 @@ class Controller:
     ----------
     settings : gives the closed loop its time step and the sizes that are measured; None: `MPCSettings()`.
     zone : the zone of people who have none of their own; None: their body alone.
-    walls : the walls that the controller knows, shape (n, 2, 2) [m], which must be those of the scenario;
-        None: not checked.
+    walls, obstacles : the walls, shape (n, 2, 2) [m], and the other obstacles that the controller knows,
+        which must be those of the scenario; None: not checked.
     robot : how the robot moves.
 
     Examples
@@ -105,6 +148,7 @@ class Controller:
     settings: MPCSettings | None = None
     zone: Any = None
     walls: Any = None
+    obstacles: Any = None
     robot: Robot = DoubleIntegrator()
 
     def __copy__(self) -> Self:
@@ -126,7 +170,7 @@ class Controller:
         Returns
         -------
         An object with `control`, shape (n,): (ax, ay) [m/s2] for a double integrator. The log also keeps
-        `predicted`, `residual`, `fallback`, `safe`, `slack` and `solve_time` where it has them: see `Step`.
+        `predicted`, `residual`, `status`, `safe`, `slack` and `solve_time` where it has them: see `Step`.
         """
         raise NotImplementedError
 
@@ -140,7 +184,7 @@ class _Adapter(Controller):
     """A controller made of any object with `reset` and `step`."""
 
     def __init__(self, controller: Any) -> None:
-        for name in ("reset", "step", "zone", "walls", "robot"):
+        for name in ("reset", "step", "zone", "walls", "obstacles", "robot"):
             if getattr(controller, name, None) is not None:
                 setattr(self, name, getattr(controller, name))
         if isinstance(settings := getattr(controller, "settings", None), MPCSettings):
@@ -156,3 +200,134 @@ def as_controller(controller: Any) -> Controller:
         `walls` and `robot` those that exist are used.
     """
     return controller if isinstance(controller, Controller) else _Adapter(controller)
+
+
+OLDEST_STATE = 1.0
+"""The greatest age of a robot's state that can be brought to the present [s] (assumed)."""
+STUCK_AFTER = 5.0
+"""Time without progress from which on a robot counts as stuck [s] (assumed)."""
+PROGRESS = 0.1  # by which the way to the goal must shorten; this near, the robot is there [m] (assumed)
+CLOSING_SPEED = 0.1  # a robot that approaches its goal faster than this makes progress [m/s] (assumed)
+NEW_GOAL = 0.5  # a goal that is farther than this from the last one is another goal [m] (assumed)
+RATE_STEPS = (
+    9  # a loop has another rate than dt if most of so many steps have (assumed)
+)
+RATE_ERROR = (
+    0.2  # share of dt by which the time between two steps may differ from dt (assumed)
+)
+# Calls without `now` are timed if they come between these multiples of dt, as those of a robot; a simulation
+# calls as fast as it can (assumed).
+REAL_TIME = 0.25, 4.0
+
+
+class StepClock:
+    """When a controller decides its steps, and what it has commanded since.
+
+    Parameters
+    ----------
+    dt : time between two steps for which the controller is made [s].
+
+    Attributes
+    ----------
+    now : time of the present step [s].
+    has_begun : True if a control was commanded.
+    """
+
+    def __init__(self, dt: float) -> None:
+        self.now, self.has_begun = 0.0, False
+        self._dt, self._elapsed, self._back = dt, dt, 0.0
+        n_held = max(RATE_STEPS, 2 * ceil(OLDEST_STATE / dt))
+        self._held = deque[tuple[Array, float]](maxlen=n_held)
+        self._periods, self._called = deque[float](maxlen=RATE_STEPS), 0.0
+        self._goal, self._nearest = (inf, inf), inf
+        self._remaining, self._waited = inf, 0.0
+
+    def tick(self, now: float | None, stamps: ArrayLike | None) -> None:
+        """Begin a step at the time `now` [s]; None: `dt` after the last, which no `stamps` can refer to."""
+        if now is None and stamps is not None:
+            raise SolverError(
+                "stamps need `now`, the time of the robot's state by the same clock; got none"
+            )
+        last, called = self.now, perf_counter()
+        if now is not None:
+            self.now = check_time(now)
+        elif self.has_begun:
+            self.now += self._dt
+        self._back = max(0.0, last - self.now) * self.has_begun
+        if self.has_begun:
+            self._elapsed = self._dt if self._back else self.now - last
+            self._held.append((self._control, self._elapsed))
+            period = self._elapsed if now is not None else called - self._called
+            self._periods.append(period)
+        self._called, self._is_timed = called, now is None
+
+    def hold(self, control: Array) -> None:
+        """End a step: the robot holds `control` until the next one."""
+        self._control, self.has_begun = control, True
+
+    def bring_forward(
+        self, robot: Robot, own: Array, age: float, at_first: Array
+    ) -> Array:
+        """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
+        left, spans = age, list[tuple[Array, float]]()
+        expected = f"0 to {OLDEST_STATE:g} s"
+        require(0 <= left <= OLDEST_STATE, "state_age", age, expected, SolverError)
+        while left > 0 and len(spans) < len(self._held):
+            control, held = self._held[-1 - len(spans)]
+            spans.append((control, min(held, left)))
+            left -= spans[-1][1]
+        for control, seconds in reversed([*spans, (at_first, left)]):
+            own = robot.advance(own, control, seconds) if seconds > 0 else own
+        return own
+
+    def time_without_progress(
+        self, remaining: float, goal: tuple[float, float]
+    ) -> float:
+        """How long the robot has made no progress [s]; 0 below `STUCK_AFTER`, and while it approaches.
+
+        Progress is a shorter `remaining` way [m] than any before. A `goal` that jumps is a new one.
+        """
+        approaches = self._remaining - remaining > CLOSING_SPEED * self._elapsed
+        # the clock may jump
+        self._waited += min(self._elapsed, max(self._dt, OLDEST_STATE))
+        if dist(goal, self._goal) > NEW_GOAL or remaining < self._nearest - PROGRESS:
+            self._nearest, self._waited = remaining, 0.0
+        self._goal, self._remaining = goal, remaining
+        if self._waited < STUCK_AFTER or remaining <= PROGRESS or approaches:
+            return 0.0
+        return self._waited
+
+    def describe(self, stamps: ArrayLike | None, memory: float) -> str:
+        """What is wrong with the times of this step, with the `stamps` of people and a tracker's `memory`."""
+        found = []
+        if self._back:
+            found.append(
+                f"the clock went back by {self._back:.3g} s; nobody is forgotten"
+            )
+        if stamps is not None:
+            late = np.abs(np.asarray(stamps, float) - self.now).max(initial=0.0)
+            if late > memory:
+                found.append(
+                    f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s only"
+                )
+        if self._has_another_rate():
+            period = median_low(self._periods)
+            found.append(
+                f"steps come every {period:.3g} s, not every dt = {self._dt:g} s: gamma is per dt"
+                + "; give `now`, or call every dt" * self._is_timed
+            )
+        return "; ".join(found)
+
+    def _has_another_rate(self) -> bool:
+        """True if most of the last steps came at another interval than dt."""
+        periods, dt = self._periods, self._dt
+        if len(periods) < RATE_STEPS or abs(periods[-1] - dt) <= RATE_ERROR * dt:
+            return False
+        low, high = (share * dt for share in REAL_TIME)
+        if self._is_timed and not low <= periods[-1] <= high:
+            return False
+        off = [each for each in periods if abs(each - dt) > RATE_ERROR * dt]
+        if not self._is_timed:
+            return 2 * len(off) > RATE_STEPS
+        is_regular = max(periods) - min(periods) < RATE_ERROR * median_low(periods)
+        return len(off) == RATE_STEPS and is_regular

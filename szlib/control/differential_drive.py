@@ -46,6 +46,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
+from operator import attrgetter
 from time import perf_counter
 from typing import Any
 
@@ -55,28 +56,29 @@ from numpy.typing import ArrayLike
 from ..checks import Array, check_array, check_number, check_point, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import compute_h
-from .controller import Controller
-from .distances import walls_with_margins
+from .controller import Controller, StepClock
 from .mpc import MPCCBF
-from .person import STANDING_SPEED, Person, SpeedZone, place_zone
+from .obstacles import Obstacle, Obstacles, Path
+from .people import (
+    STANDING_SPEED,
+    People,
+    Person,
+    SpeedZone,
+    TrackedPeople,
+    Tracker,
+)
 from .routes import Point
-from .scene import Scene
 from .settings import TOLERANCE, MPCSettings
-from .step import Fallback, Step
-from .step_clock import StepClock
-from .step_report import StepReport, verify_disc
-from .tracker import People, Tracker
+from .step import Scene, Step
+from .verification import ROUNDING, Report, find_gap, is_undecided, verify_step
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
-_TURNS = np.array(
-    sorted(np.linspace(-pi, pi, 33), key=abs)
-)  # turns that are tried, in this order [rad]
-_TURN, _ALIGNED = (
-    1.0,
-    0.2,
-)  # largest turn that is asked for at once, and where a turn ends [rad]
+# turns that are tried, in this order [rad]
+_TURNS = np.array(sorted(np.linspace(-pi, pi, 33), key=abs))
+# largest turn that is asked for at once, and where a turn ends [rad]
+_TURN, _ALIGNED = (1.0, 0.2)
 _FREE = 0.02  # h that the point needs [m]
+_SAMPLES = 17  # points of an arc at which a step is verified
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,51 @@ class Unicycle:
         return np.array([x, y, (theta + 2 * half + pi) % (2 * pi) - pi, v, omega])
 
 
+@dataclass(frozen=True)
+class _Wheels:
+    """The commands that bring the point ahead of the axle from place to place.
+
+    Attributes
+    ----------
+    ahead : distance of the point from the axle [m].
+    v_max : its greatest speed [m/s].
+    """
+
+    ahead: float
+    v_max: float
+    robot: Unicycle = Unicycle()
+
+    def follow(
+        self, own: Array, points: Array, lasts: Iterable[float]
+    ) -> tuple[Array, Array]:
+        """States of the disc, shape (k+1, 4), and commands, shape (k, 2).
+
+        Parameters
+        ----------
+        own : state of the robot, (x, y, theta, v, omega).
+        points : where the point is to be, one after the other, shape (k, 2) [m].
+        lasts : time to each of them [s].
+        """
+        at, states, controls = own, [self.robot.body(own)], list[Array]()
+        for (px, py), dt in zip(points.tolist(), lasts, strict=True):
+            x, y, theta = at[:3].tolist()
+            c, s = cos(theta), sin(theta)
+            dx, dy = px - x - self.ahead * c, py - y - self.ahead * s
+            share = min(1.0, self.v_max * dt / (hypot(dx, dy) or 1.0))
+            xi, eta = share * (dx * c + dy * s), share * (dy * c - dx * s)
+            beta = atan2(eta, 2 * self.ahead + xi)
+            way = (xi * cos(beta) + eta * sin(beta)) / float(np.sinc(beta / pi))
+            controls.append(np.array([way / dt, 2 * beta / dt]))
+            at = self.robot.advance(at, controls[-1], dt)
+            states.append(self.robot.body(at))
+        return np.array(states), np.reshape(controls, (-1, 2))
+
+
+def _of_point(name: str) -> Any:
+    """A property of a `DriveStep` that is one of its point's step."""
+    return property(attrgetter(f"point.{name}"), doc=f"`Step.{name}` of the point.")
+
+
 @dataclass(frozen=True, repr=False)
 class DriveStep:
     """What a differential drive does next, and how far it can be relied upon.
@@ -127,64 +174,126 @@ class DriveStep:
     ----------
     control : (v, omega) to hold for the next dt, within their limits, shape (2,) [m/s, rad/s].
     predicted : (x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s].
-    h : barriers of the disc now, people before walls, shape (people + walls,) [m].
-    safe : as `Step.safe`, for the disc: no person is unknown, the plan satisfies the hard problem, and the
-        disc has h >= 0 now and dt later, and overlaps no body and no wall until then, if people keep their
-        velocity.
-    heading : of the robot now [rad].
+    own : state of the robot now, (x, y, theta, v, omega).
     scene : what the step was asked, for the disc.
-    point : the step of the point ahead of the axle, a `Step`.
-    fallback, slack, residual, stuck, clock : of that step: see `Step`.
+    point : the step of the point ahead of the axle. Its claims `walls_safe` and `passively_safe` are about
+        the disc.
+    wheels : how they follow the point.
     solve_time : wall-clock time of the whole step [s].
     """
 
     control: Array
     predicted: Array
-    h: Array
-    safe: bool
-    heading: float
+    own: Array
     scene: Scene
     point: Step
-    fallback: Fallback
-    slack: float
-    residual: Array
-    stuck: float
-    clock: str
+    wheels: _Wheels
     solve_time: float
 
-    def verify(self) -> StepReport:
+    status = _of_point("status")
+    slack = _of_point("slack")
+    residual = _of_point("residual")
+    stuck = _of_point("stuck")
+    clock = _of_point("clock")
+    walls_safe = _of_point("walls_safe")
+    passively_safe = _of_point("passively_safe")
+
+    @property
+    def h(self) -> Array:
+        """Barriers of the disc now, as of `Step.h` [m]."""
+        return self.scene.spread(self.scene.barriers.h(*self.scene.state[:2]))
+
+    @property
+    def safe(self) -> bool:
+        """As of `Step.safe`, for the disc.
+
+        No person is unknown, the plan of the point satisfies every row without a price, and the disc has h >=
+        0 now and dt later, and overlaps no body and no wall until then, if people keep their velocity.
+        """
+        points, dt = self.predicted[:2, :2], self.scene.settings.dt
+        bows = np.full((2, 1), abs(self.control.prod()) * dt**2 / 8)
+        path = Path(points, np.array([0.0, dt]), *bows)
+        h = self.scene.barriers.h(points[:, 0], points[:, 1], path.times)
+        least = min(h.min(initial=inf), self.scene.bound_gap(path))
+        is_clear = bool(least >= -TOLERANCE)
+        return self.point.feasible and not self.point.unknown and is_clear
+
+    def verify(self) -> Report:
         """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
-        return verify_disc(self.scene, self.heading, self)
+        scene, dt = self.scene, self.scene.settings.dt
+        found = verify_step(self.point, scene, self._carry)
+        path = self._drive(self.own[:3], self.control, dt)
+        gap, now = find_gap(scene, path), self.h
+        after = scene.barriers.h(path[-1, 0], path[-1, 1], dt)
+        worst = min([gap, *now, *after])
+        safe = found.feasible and not scene.tracked.unknown and worst >= -TOLERANCE
+        moved = np.abs(path[[0, -1]] - self.predicted[:2, :2]).max()
+        is_right = {
+            "motion": moved <= ROUNDING * max(1.0, float(np.abs(path).max())),
+            "safe": safe == self.safe or is_undecided(scene, path, worst, self.safe),
+        }
+        faults = [
+            f"{name} of the disc is wrong" for name, ok in is_right.items() if not ok
+        ]
+        h = float(now.min(initial=inf))
+        return replace(found, faults=(*found.faults, *faults), h=h, gap=gap, safe=safe)
+
+    def _carry(self, points: Array, times: Array) -> tuple[Array, Array]:
+        """The way of the disc, whose wheels follow the point from one of `points` to the next."""
+        own, lasts, found = self.own, np.diff(times), [self.own[None, :2]]
+        _, commands = self.wheels.follow(own, points[1:], lasts.tolist())
+        for command, last in zip(commands, lasts, strict=True):
+            found.append(self._drive(own, command, last)[1:])
+            own = self.wheels.robot.advance(own, command, last)
+        shares = np.linspace(0.0, 1.0, _SAMPLES)[1:]
+        within = (times[:-1, None] + lasts[:, None] * shares).ravel()
+        return np.concatenate(found), np.concatenate([times[:1], within])
+
+    @staticmethod
+    def _drive(own: Array, control: Array, dt: float) -> Array:
+        """Points of the arc on which the disc drives from `own` for `dt` [s], shape (n, 2) [m]."""
+        x, y, theta, *_ = own
+        v, omega = control
+        turned = 1j * (omega or 1e-9) * np.linspace(0.0, dt, _SAMPLES)
+        way = v * np.exp(1j * theta) * np.expm1(turned) / turned[-1] * dt
+        return np.column_stack([x + way.real, y + way.imag])
 
     def __repr__(self) -> str:
         (v, omega), safe = self.control.tolist(), "safe" if self.safe else "not safe"
         h = min(self.h.tolist(), default=inf)
-        return f"DriveStep({self.fallback}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s, min h={h:.3g} m)"
+        return f"DriveStep({self.status}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s, min h={h:.3g} m)"
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified, as `Step.explain` does for the point."""
         faults = [
-            f"\n  WRONG: {fault}" for fault in self.verify().faults if "disc" in fault
+            f"\n  WRONG: {each}" for each in self.verify().faults if "disc" in each
         ]
         return f"{self!r}{''.join(faults)}\nThe point ahead of the axle: {self.point.explain()}"
 
 
 class _Point(MPCCBF):
-    """The controller of the point ahead of the axle. The goal is checked for the disc instead."""
+    """The controller of the point ahead of the axle; its guard looks at the disc."""
 
-    def _check_goal(self, goal: tuple[float, float]) -> None:
-        pass
+    wheels: _Wheels
+    own: Array  # state of the robot at this step
 
     def _look_ahead(
         self, at: Point, goal: Point, route: ArrayLike | None
     ) -> tuple[Point, float]:
         """As of `MPCCBF`, but straight to a `goal` so close that no wall lies between, as in a turn."""
         away = dist(at, goal)
-        return (
-            (goal, away)
-            if away < self.settings.r_robot
-            else super()._look_ahead(at, goal, route)
+        if away < self.settings.r_robot:
+            return goal, away
+        return super()._look_ahead(at, goal, route)
+
+    def _carry(self, path: Path) -> Path:
+        """The way of the disc whose wheels follow the point on a `path`."""
+        lasts = np.diff(path.times)
+        centres, commands = self.wheels.follow(
+            self.own, path.points[1:], lasts.tolist()
         )
+        bows = np.abs(commands.prod(axis=1)) * lasts**2 / 8
+        return Path(centres[:, :2], path.times, bows, bows)
 
 
 class DifferentialDrive(Controller):
@@ -192,7 +301,7 @@ class DifferentialDrive(Controller):
 
     Parameters
     ----------
-    zone, walls, max_people, tracker : as of `MPCCBF`.
+    zone, walls, obstacles, tracker : as of `MPCCBF`.
     settings : of the robot: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
         `a_max` bounds the acceleration of the point ahead of the axle.
     omega_max : limit of |omega| [rad/s]; default: that of a common indoor robot whose wheels reach 1 m/s
@@ -236,10 +345,10 @@ class DifferentialDrive(Controller):
         zone: Ellipse | SpeedZone,
         *,
         walls: Any = (),
+        obstacles: Iterable[Obstacle] = (),
         settings: MPCSettings | None = None,
         omega_max: float = 4.0,
         ahead: float | None = None,
-        max_people: int | None = None,
         tracker: Tracker | None = None,
     ) -> None:
         self.settings = s = settings or MPCSettings()
@@ -267,9 +376,11 @@ class DifferentialDrive(Controller):
         )
         self.goal_clearance = radius + self.ahead
         self._point = _Point(
-            zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker
+            zone, walls=walls, obstacles=obstacles, settings=grown, tracker=tracker
         )
-        self.zone = self._point.zone
+        self._point.wheels = self._wheels = _Wheels(self.ahead, self.v_max)
+        self._point._spare = radius - s.r_robot
+        self.zone, self.obstacles = self._point.zone, self._point.obstacles
         self._take_walls()
         self.reset()
 
@@ -279,8 +390,8 @@ class DifferentialDrive(Controller):
         self._take_walls()
 
     def _take_walls(self) -> None:
-        self.walls = self._point.walls
-        self._wall_rows = walls_with_margins(self.walls, self.settings)
+        self.walls, fixed = self._point.walls, self._point._fixed.items
+        self._fixed = Obstacles.of(fixed, self.settings)
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
@@ -317,72 +428,83 @@ class DifferentialDrive(Controller):
         SolverError : as of `MPCCBF.step`.
         """
         began = perf_counter()
-        own = check_array(
-            "state", state, (5,) if np.asarray(state, object).size == 5 else (3,)
-        ).tolist()
+        old = self._read_state(state)
         self._clock.tick(now, stamps)
-        old = np.array([*own[:3], *(own[3:] or self._command or (0.0, 0.0))])
-        own = self._clock.bring_forward(
-            self.robot, old, check_number("state_age", state_age), old[3:]
-        )
-        x, y, theta, *speeds = own.tolist()
-        centre, lever = (
-            check_array("goal", goal, (2,)),
-            self.ahead * np.array([cos(theta), sin(theta)]),
-        )
-        if not self._command and min(self.barriers(centre), default=0.0) < 0:
-            raise SolverError(
-                f"the goal {centre.tolist()} cannot be reached: it lies too close to a wall; choose one at "
-                f"least {self.goal_clearance:.2f} m away from all walls"
-            )
-        start = (*(own[:2] + lever).tolist(), *self._velocity(theta, *speeds))
+        age = check_number("state_age", state_age)
+        own = self._clock.bring_forward(self.robot, old, age, old[3:])
+        theta, centre = float(own[2]), np.array(check_point("goal", goal))
+        start = own[:2] + self.ahead * np.array([cos(theta), sin(theta)])
         turn = self._find_turn(own[:3].tolist(), centre)
-        at_end = (
-            own[:2] if turn else centre
-        )  # of the axle: it turns where it stands, or drives to the goal
+        # of the axle: it turns where it stands, or drives to the goal
+        at_end = own[:2] if turn else centre
         towards = at_end + self.ahead * np.array([cos(theta + turn), sin(theta + turn)])
+        self._point.own = own
         point = self._point.step(
-            start, towards, people, ids=ids, stamps=stamps, now=now, route=route
+            np.concatenate([start, self._velocity(*own[2:].tolist())]),
+            towards,
+            people,
+            ids=ids,
+            stamps=stamps,
+            now=now,
+            route=route,
         )
-        self._seen = point.scene
-        states, controls = self._follow(own, point.predicted[1:, :2])
-        self._command, self._planned_velocity = (
-            controls[0].tolist(),
-            point.predicted[1, 2:].tolist(),
-        )
-        scene, dt = (
-            point.scene._replace(settings=self.settings, walls=self._wall_rows),
-            self.settings.dt,
-        )
-        scene = scene._replace(
-            state=tuple(states[0].tolist()), goal=tuple(centre.tolist())
-        )
+        self._seen, lasts = point.scene, np.diff(self.settings.times).tolist()
+        states, controls = self._wheels.follow(own, point.predicted[1:, :2], lasts)
+        self._command = controls[0].tolist()
+        self._planned_velocity = point.predicted[1, 2:].tolist()
         self._clock.hold(controls[0])
-        h, (x1, y1), (v, omega) = scene.h(x, y), states[1][:2].tolist(), self._command
-        gap = scene.smallest_gap((x, y), (x1, y1), abs(v * omega))
-        smallest = min([*h, *scene.h(x1, y1, dt), gap])
+        scene = self._make_scene(point.scene, states[0].tolist(), centre.tolist())
         return DriveStep(
             control=controls[0],
-            predicted=np.array(states),
-            h=scene.spread(np.array(h)),
-            safe=point.feasible and not point.unknown and smallest >= -TOLERANCE,
-            heading=theta,
+            predicted=states,
+            own=own,
             scene=scene,
             point=point,
-            **{
-                name: getattr(point, name)
-                for name in ("fallback", "slack", "residual", "stuck", "clock")
-            },
+            wheels=self._wheels,
             solve_time=perf_counter() - began,
         )
 
-    def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
-        """h of all `people` and then of all walls, for the disc at `position`, shape (n,) [m]."""
-        (x, y), s = check_point("position", position), self.settings
-        zones = [place_zone(person, self._point.zone_of(person)) for person in people]
-        return np.array(
-            compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps)
+    def _read_state(self, state: ArrayLike) -> Array:
+        """(x, y, theta, v, omega) from a `state` with or without the speeds."""
+        size = np.asarray(state, object).size
+        if size not in (3, 5):
+            raise SolverError(
+                "state must be (x, y, theta) or (x, y, theta, v, omega) of the axle's middle; got "
+                f"{size} numbers: {state!r}"
+            )
+        own = check_array("state", state, (size,)).tolist()
+        return np.array([*own[:3], *(own[3:] or self._command or (0.0, 0.0))])
+
+    def _make_scene(
+        self, seen: Scene, state: Sequence[float], goal: Sequence[float]
+    ) -> Scene:
+        """The scene of the disc, from that of the point."""
+        s = self.settings
+        return seen._replace(
+            state=tuple(state),
+            goal=(goal[0], goal[1]),
+            settings=s,
+            fixed=self._fixed,
+            zones=Obstacles.of(seen.zones.items, s),
+            near_fixed=Obstacles.of(seen.near_fixed.items, s),
         )
+
+    def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
+        """h of the disc at a `position`: of `people`, then of everything fixed, shape (obstacles,) [m]."""
+        point = check_point("position", position)
+        tracked = TrackedPeople(tuple(people))
+        seen = self._point._make_scene((*point, 0.0, 0.0), point, tracked)
+        return self._make_scene(seen, seen.state, point).barriers.h(*point)
+
+    def check_start(
+        self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person]
+    ) -> None:
+        """Raise SolverError if the `goal` is too close to a wall, from any `state` and with any `people`."""
+        if min(self.barriers(goal), default=0.0) < 0:
+            raise SolverError(
+                f"the goal {list(check_point('goal', goal))} cannot be reached: it lies too close to a wall; "
+                f"choose one at least {self.goal_clearance:.2f} m away from all walls"
+            )
 
     def _find_turn(self, own: list[float], goal: Array) -> float:
         """Angle by which the robot turns where it stands, close to its `goal` [rad]; 0: it drives on.
@@ -391,26 +513,21 @@ class DifferentialDrive(Controller):
         wall or a person who stands. It turns its back to the goal, or as far as the point could be there
         then, and goes backwards.
         """
-        (x, y, theta), (gx, gy), s, scene = (
-            own,
-            goal.tolist(),
-            self._point.settings,
-            self._seen,
-        )
-        if (
-            scene is None
-            or hypot(gx - x, gy - y)
-            > (1.5 if self._turns else 1.0) * _NEAR * self.ahead
-        ):
+        (x, y, theta), (gx, gy), scene = own, goal.tolist(), self._seen
+        reach = (1.5 if self._turns else 1.0) * _NEAR * self.ahead
+        if scene is None or hypot(gx - x, gy - y) > reach:
             self._turns = False
             return 0.0
         headings = np.array([theta, *(atan2(y - gy, x - gx) + _TURNS)])
         px, py = gx + self.ahead * np.cos(headings), gy + self.ahead * np.sin(headings)
-        standing = [
-            zone for zone in scene.zones if hypot(zone.vx, zone.vy) < STANDING_SPEED
-        ]
-        h = compute_h(px, py, standing, scene.near_walls, r_robot=s.r_robot, eps=s.eps)
-        free = np.min(np.vstack([*h, np.full(len(px), inf)]), axis=0) >= _FREE
+        standing = (
+            zone
+            for zone, person in zip(scene.zones.items, scene.people, strict=True)
+            if hypot(*person.velocity) < STANDING_SPEED
+        )
+        s = self._point.settings
+        h = Obstacles.of(standing, s).joined(scene.near_fixed).h(px, py)
+        free = h.min(axis=0, initial=inf) >= _FREE
         turn = remainder(float(headings[1:][free[1:].argmax()]) - theta, 2 * pi)
         self._turns = bool(free[1:].any()) and (
             abs(turn) > _ALIGNED if self._turns else not free[0]
@@ -427,23 +544,3 @@ class DifferentialDrive(Controller):
                 return self._planned_velocity
         c, s, sideways = cos(theta), sin(theta), self.ahead * omega
         return [v * c - sideways * s, v * s + sideways * c]
-
-    def _follow(self, own: Array, points: Array) -> tuple[list[Array], list[Array]]:
-        """States of the disc, and the commands that bring the point to `points`, shape (up to N, 2)."""
-        at, states, controls = own, [self.robot.body(own)], list[Array]()
-        for (px, py), length in zip(
-            points.tolist(), self.settings.step_lengths, strict=False
-        ):
-            (x, y, theta), dt = at[:3].tolist(), length * self.settings.dt
-            c, s = cos(theta), sin(theta)
-            dx, dy = px - x - self.ahead * c, py - y - self.ahead * s
-            share = min(1.0, self.v_max * dt / (hypot(dx, dy) or 1.0))
-            xi, eta = share * (dx * c + dy * s), share * (dy * c - dx * s)
-            beta = atan2(eta, 2 * self.ahead + xi)
-            speed = (xi * cos(beta) + eta * sin(beta)) / (
-                dt * float(np.sinc(beta / pi))
-            )
-            controls.append(np.array([speed, 2 * beta / dt]))
-            at = self.robot.advance(at, controls[-1], dt)
-            states.append(self.robot.body(at))
-        return states, controls

@@ -1,6 +1,25 @@
 """The controller: model predictive control with barriers around people and walls (MPC-CBF).
 
-`problem` states the problem, `solvers` solve it, `solvers.fallbacks` says what follows where they fail.
+`planner` states the problem and solves it. Before a control is applied, one check looks at what would follow.
+
+The guard
+---------
+*Walls.* Say that a state can stop if a robot that brakes as hard as it can along its path touches nothing
+fixed. It moves on a straight segment then, which ends where it rests. A control is applied only if the way
+during dt touches nothing fixed and the state after it can stop; else the robot brakes. If a state can stop,
+the state after dt of braking can, because its segment is a part of the first one. So by induction:
+
+    from any state that can stop, the robot never touches a wall, whatever people do, appear or vanish, and
+    whatever a sensor says about them,
+
+because people enter neither the condition nor the braking (`Step.walls_safe`).
+
+*Bodies.* A control is passively safe if, with people who keep their velocity, the robot overlaps no body
+while it moves: if it brakes after dt, or if it follows its plan to the end and brakes there. It must not
+move towards a body that it overlaps already, by more than the curve within a step. If the plan is not
+passively safe and braking is better, the robot brakes. So it is at rest when somebody walks into it, if
+people keep their velocity and it could be (`Step.passively_safe`; passive safety: Macek et al., ECMR 2009).
+Walls go first: braking is safe for them.
 
 The terminal condition
 ----------------------
@@ -11,25 +30,15 @@ the barrier rows of the steps that both plans share. The new row is
 h(x_N) - (1 - gamma) h(x_N) = gamma h(x_N), and the old rows give h(x_{k+1}) >= (1 - gamma) h(x_k), so
 h(x_N) >= (1 - gamma)^N h(x_0) >= 0: the new row holds as well. So a robot that starts in the safe set with
 a solution, at rest for instance (u = 0), has one for ever, and h >= 0 for ever.
-
-*Passive safety*: if people walk as predicted, the new row may fail, because they come closer while the
-robot rests. Say that a plan reaches a safe end if h >= 0 at all its states up to the one from which on it
-rests. By the inequality above each solution does, and so does a shifted plan that did before. So if the
-problem has no solution, the relaxed plan is applied only if it reaches a safe end, and otherwise the last
-plan, shifted. Then at the first instant at which any h < 0 the robot is at rest: a moving robot hits nobody.
-
-`terminal="person"` (one person, walking at velocity w, |w| <= v_max, no wall; v_N = w). In the frame of the
-person both arguments are the first one: appending 0 keeps the robot at the person's velocity, so
-h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although the person walks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from math import dist, hypot
+from math import dist, hypot, inf
 from threading import get_ident
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 from warnings import catch_warnings
 
 import numpy as np
@@ -41,28 +50,37 @@ from ..checks import (
     check_number,
     check_point,
     check_vector,
-    require,
 )
 from ..errors import DataWarning, SolverError, warn
-from ..zones.ellipses import Ellipse, circle_around
-from .barriers import find_near_walls, find_solids, read_walls
-from .controller import Controller
-from .distances import walls_with_margins
-from .head_on import find_target
-from .person import Person, SpeedZone, as_ellipse, place_zone
-from .routes import Point, RoutePlanner, find_boxes
-from .scene import Scene
-from .settings import MPCSettings
-from .solvers.fallbacks import solve_with_fallbacks
-from .solvers.solver_pool import SolverPool, active_rows, padded_parameters
-from .step import Step
-from .step_clock import StepClock
-from .tracker import People, TrackedPeople, Tracker
+from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
+from .controller import Controller, StepClock, find_stopping_path
+from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone
+from .people import People, Person, SpeedZone, TrackedPeople, Tracker, as_ellipse
+from .planner import Plan, Planner
+from .problem import Question, build_horizon, plan_braking, solve_by_ipopt
+from .routes import Point, RoutePlanner, find_boxes, find_target
+from .settings import TOLERANCE, MPCSettings
+from .step import Scene, Status, Step
+from .verification import AT_REST
+from .walls import find_solids, read_walls
 
-_MOST_PEOPLE = 1000  # greatest number for which solvers are prepared: those for 10,000 take 1.5 GB of memory
-_FEW_WALLS = (
-    24  # up to this number all walls are in the problem, of more those that are near
-)
+_FEW = 24  # up to this number all obstacles are in the problem, of more those that are near
+_BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
+
+
+class Outlook(NamedTuple):
+    """What follows a control, if people keep their velocity.
+
+    Attributes
+    ----------
+    wall, body : lower bounds of the gaps to everything fixed, and to bodies while the robot moves [m].
+    wall_seen, body_seen : the least of these gaps at points of the way [m].
+    """
+
+    wall: float
+    body: float
+    wall_seen: float
+    body_seen: float
 
 
 class MPCCBF(Controller):
@@ -79,15 +97,13 @@ class MPCCBF(Controller):
     walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. Inside of
         a polygon, or of a map's walls (`walls_from_map`), no step is safe. The attribute `walls` holds their
         segments.
+    obstacles : what else stands still: `HalfPlane`s, or an `Obstacle` of your own; an attribute as well.
     settings : every other parameter.
-    max_people : number of people to prepare solvers for, at most 1000. None: 8, and more in the background as
-        soon as half of this number is present. For more people than are prepared the solver is built within
-        the step, which no time limit covers; the log "szlib" says so (level INFO).
     tracker : remembers people by their ids; default: `Tracker()`.
 
     Raises
     ------
-    SolverError : a wall is not finite or has no length, or settings and walls do not fit.
+    SolverError : a wall is not finite or has no length, or something is no obstacle.
     ZoneError : `zone` is no zone.
 
     Warns
@@ -109,15 +125,16 @@ class MPCCBF(Controller):
     settings: MPCSettings
     zone: Ellipse
     walls: Array
-    _planner: RoutePlanner | None
+    _routes: RoutePlanner | None
+    _spare = 0.0  # what the radius in `settings` is larger than the disc [m]
 
     def __init__(
         self,
         zone: Ellipse | SpeedZone,
         *,
         walls: Any = (),
+        obstacles: Iterable[Obstacle] = (),
         settings: MPCSettings | None = None,
-        max_people: int | None = None,
         tracker: Tracker | None = None,
     ) -> None:
         self.settings = settings or MPCSettings()
@@ -126,41 +143,41 @@ class MPCCBF(Controller):
             warn(
                 f"the zone at {speed:g} m/s should not be relied on: {verdict.sentence}"
             )
-        with catch_warnings(
-            action="ignore", category=DataWarning
-        ):  # the verdict states the same
+        # the verdict states the same
+        with catch_warnings(action="ignore", category=DataWarning):
             self.zone = as_ellipse(zone, speed)
-        is_number = max_people is None or (
-            isinstance(max_people, int) and 0 <= max_people <= _MOST_PEOPLE
-        )
-        expected = f"a whole number from 0 to {_MOST_PEOPLE}, or None"
-        require(is_number, "max_people", max_people, expected, SolverError)
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
+        self.obstacles = tuple(obstacles)
+        for each in self.obstacles:
+            if not isinstance(each, Obstacle):
+                raise SolverError(f"an obstacle must be an Obstacle; got {each!r}")
+        self._planner = Planner(self.settings)
+        self._nothing = Obstacles((), self.settings.r_robot)
         self._take_walls(walls)
-        self._pool = SolverPool(
-            self.settings, max_people, min(len(self.walls), _FEW_WALLS)
-        )
         self.reset()
 
     def _take_walls(self, walls: Any) -> None:
-        segments = read_walls(walls)
-        if self.settings.terminal == "person" and len(segments):
-            raise SolverError(
-                f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'"
-            )
-        self.walls, self._wall_rows = (
-            segments,
-            walls_with_margins(segments, self.settings),
-        )
-        self._solids, self._planner = find_solids(walls), None
-        self._near_from, self._near_reach, self._slots = (0.0, 0.0), 0.0, 0
+        self.walls = read_walls(walls)
+        items = [Wall(*ends) for ends in self.walls.reshape(-1, 4).tolist()]
+        self._walls, self._solids, self._routes = items, find_solids(walls), None
+        self._items = (*items, *self.obstacles)
+        self._fixed = Obstacles.of(self._items, self.settings)
+        self._near_from, self._near_reach = (0.0, 0.0), 0.0
+        self._take_near(self._items)
+
+    def _take_near(self, items: Sequence[Obstacle]) -> None:
+        """Take these as what is fixed near the robot, and those among them that it can always stop before."""
+        self._near_fixed = Obstacles.of(items, self.settings)
+        walls = (each for each in items if each.is_fixed)
+        self._walls_near = Obstacles.of(walls, self.settings)
+        self._room: tuple[Point, float] = (0.0, 0.0), -inf
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
 
         Parameters
         ----------
-        walls : as of `MPCCBF`. A solver of another size (1, 2, 3, 4, 6, ... walls) is built now if needed.
+        walls : as of `MPCCBF`.
 
         Raises
         ------
@@ -169,7 +186,6 @@ class MPCCBF(Controller):
         """
         self._check_thread()
         self._take_walls(walls)
-        self._pool.get(self._n_barriers, min(len(self.walls), _FEW_WALLS))
 
     def _check_thread(self) -> None:
         if self._thread.setdefault("first", get_ident()) != get_ident():
@@ -183,13 +199,13 @@ class MPCCBF(Controller):
 
     def reset(self) -> None:
         """Forget the last plan and all people, so that the next step depends on no earlier one."""
-        self._plan, self._change = np.zeros((2, 2 * self.settings.N))
-        self._clock, self._n_barriers = StepClock(self.settings.dt), 0
+        self._plan, self._change = np.zeros((2, self.settings.N, 2))
+        self._clock = StepClock(self.settings.dt)
         self.tracker.reset()
-        self._pool.reset()
-        self._near_reach, self._slots = 0.0, 0
-        if self._planner:
-            self._planner.reset()
+        self._planner.reset()
+        self._near_reach, self._room = 0.0, ((0.0, 0.0), -inf)
+        if self._routes:
+            self._routes.reset()
 
     def step(
         self,
@@ -205,8 +221,8 @@ class MPCCBF(Controller):
     ) -> Step:
         """Decide the acceleration for the next `dt`.
 
-        The robot always gets a control, whatever people do and whatever a sensor measures. `Step.fallback`
-        and `Step.slack` tell if people leave it no way, `Step.goal_blocked` if the goal cannot be reached.
+        The robot always gets a control, whatever people do and whatever a sensor measures. `Step.status`
+        tells if people leave it no way, `Step.goal_blocked` if the goal cannot be reached.
 
         Measurements of people that cannot be used are rejected and counted (`Step.rejected`); the last known
         state of the same person, moved forward, takes their place. If nothing is known of a person
@@ -235,67 +251,179 @@ class MPCCBF(Controller):
 
         Raises
         ------
-        SolverError : an error of the program: a number or a shape cannot be used, the goal of the first step
-            lies too close to a wall, or the controller belongs to another thread.
+        SolverError : an error of the program: a number or a shape cannot be used, or the controller belongs
+            to another thread.
         """
         began = perf_counter()
         self._check_thread()
         x, towards = check_vector("state", state, 4), check_point("goal", goal)
-        clock, first = self._clock, not self._clock.has_begun
-        if first:
-            self._check_goal(towards)
+        clock = self._clock
         clock.tick(now, stamps)
         if age := check_number("state_age", state_age):
             x = clock.bring_forward(self.robot, np.array(x), age, np.zeros(2)).tolist()
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
-        scene = self._scene(x, towards, tracked, self._find_near(*x))
+        scene = self._make_scene(x, towards, tracked, self._find_near(*x))
         ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
-        remaining = way_length if way_length < np.inf else dist(x[:2], towards)
-        barriers, n_walls = scene.barriers, len(scene.near_walls)
-        self._n_barriers = len(barriers)
-        solver = self._pool.get(self._n_barriers, max(n_walls, self._slots))
-        self._pool.budget.begin(perf_counter() - began)
-        size = solver.evaluate.size
-        parameters = self._parameters(x, ahead, scene, barriers, size)
-        fallback, plan, timed_out = solve_with_fallbacks(
-            solver, self._plan, self._change, parameters
-        )
-        self._change = np.zeros(plan.inputs.size) if first else plan.inputs - self._plan
-        self._plan, rows = plan.inputs, active_rows(len(scene.zones), n_walls, size)
-        clock.hold(self._plan[:2])
+        remaining = way_length if way_length < inf else dist(x[:2], towards)
+        target = self._find_target(scene, ahead)
+        self._planner.budget.begin(began)
+        status, plan = self._decide(scene, target)
+        walls_safe, passively_safe, brakes = self._guard(scene, plan)
+        if brakes:
+            inputs = plan_braking(self.settings, x[2:])
+            status, plan = "braking", plan._replace(inputs=inputs)
+        if clock.has_begun:
+            self._change = plan.inputs - self._plan
+        self._plan = plan.inputs
+        clock.hold(plan.inputs[0])
         return Step(
-            control=self._plan[:2].copy(),
-            predicted=plan.states,
-            fallback=fallback,
-            slack=plan.slack,
-            residual=scene.spread(
-                plan.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows]
-            ),
-            h=scene.spread(plan.h[rows, 0]),
-            target=parameters[4:6],
-            cost=plan.cost,
+            control=plan.inputs[0].copy(),
+            inputs=plan.inputs,
+            status=status,
+            walls_safe=walls_safe,
+            passively_safe=passively_safe,
+            target=np.array(target),
             solve_time=perf_counter() - began,
-            timed_out=timed_out,
+            timed_out=plan.timed_out,
             scene=scene,
             way_length=way_length,
             stuck=clock.time_without_progress(remaining, towards),
             clock=clock.describe(stamps, self.tracker.memory),
         )
 
+    def _decide(self, scene: Scene, target: Point) -> tuple[Status, Plan]:
+        """The plan: of least cost if one satisfies the rows, else the one that violates least by priorities.
+
+        A plan that violates a floor may be a poor local optimum, which leads through a wall; so it is
+        compared with the one that is found from full braking.
+        """
+        s, last = self.settings, self._plan[0] if self._clock.has_begun else (0.0, 0.0)
+        question = Question(scene.state, target, last, scene.zones, scene.near_fixed)
+        guess = self._plan + self._change
+        if s.solver == "ipopt":
+            inputs = solve_by_ipopt(s, question, guess.clip(-s.a_max, s.a_max))
+            if inputs is not None:
+                return "optimal", Plan(inputs, (), False, False)
+        plan = self._planner.plan(question, guess)
+        if plan.violations == (inf,):
+            return "braking", plan._replace(inputs=plan_braking(s, scene.state[2:]))
+        if not plan.is_relaxed:
+            is_too_fast = hypot(*scene.state[2:]) > s.v_max + TOLERANCE
+            return "relaxed" if is_too_fast else "optimal", plan
+        if max(plan.violations[:-1], default=inf) > 0.0 and not plan.timed_out:
+            braking = plan_braking(s, scene.state[2:])
+            other = self._planner.plan(question, braking)
+            if other.violations < plan.violations:
+                return "restarted", other
+        return "relaxed", plan
+
+    def _guard(self, scene: Scene, plan: Plan) -> tuple[bool, bool, bool]:
+        """Whether the control is safe for walls, whether it is passively safe, and whether to brake."""
+        s, state, control = self.settings, scene.state, plan.inputs[0]
+        near = self._find_reach(scene, control)
+        if near is None:
+            return True, True, False
+        after = self._foresee(*near, find_stopping_path(state, control, s))
+        if after.body < -TOLERANCE:
+            path = self._follow_plan(scene, plan.inputs)
+            later = self._foresee(self._nothing, scene.bodies, path)
+            after = after._replace(body=max(after.body, later.body))
+        walls_safe, bodies_safe = after.wall >= -TOLERANCE, after.body >= -TOLERANCE
+        if (walls_safe and bodies_safe) or not s.guard:
+            return walls_safe, walls_safe and bodies_safe, False
+        braking = plan_braking(s, state[2:])[0]
+        rest = self._foresee(*near, find_stopping_path(state, braking, s))
+        if walls_safe:
+            brakes = rest.body_seen >= min(-TOLERANCE, after.body_seen)
+        else:
+            brakes = rest.wall_seen >= min(-TOLERANCE, after.wall_seen)
+        if brakes:
+            walls_safe, bodies_safe = rest.wall >= -TOLERANCE, rest.body >= -TOLERANCE
+        return walls_safe, walls_safe and bodies_safe, brakes
+
+    def _find_reach(
+        self, scene: Scene, control: Array
+    ) -> tuple[Obstacles, Obstacles] | None:
+        """What the robot could touch before it rests: fixed, and bodies; None if nothing.
+
+        A way of the length L lies within L / 2 of the middle between its ends. A person walks a segment.
+        """
+        s, (x, y, vx, vy), (ax, ay) = self.settings, scene.state, control.tolist()
+        last_vx, last_vy = vx + s.dt * ax, vy + s.dt * ay
+        fastest = max(abs(last_vx), abs(last_vy))
+        stop = fastest / s.a_max / 2
+        way = hypot(vx + last_vx, vy + last_vy) * s.dt / 2
+        reach, time = (
+            way + stop * hypot(last_vx, last_vy) + _BRAKING_ERROR,
+            2 * stop + 2 * s.dt,
+        )
+        mx = x + (s.dt * (vx + last_vx) / 2 + stop * last_vx) / 2
+        my = y + (s.dt * (vy + last_vy) / 2 + stop * last_vy) / 2
+        contact, near = BODY_RADIUS + s.r_robot + reach / 2, list[int]()
+        for i, person in enumerate(scene.people):
+            (px, py), (wx, wy) = person.position, person.velocity
+            dx, dy, squared = px - mx, py - my, wx * wx + wy * wy
+            if squared:
+                t = min(time, max(0.0, -(dx * wx + dy * wy) / squared))
+                dx, dy = dx + t * wx, dy + t * wy
+            if hypot(dx, dy) < contact:
+                near.append(i)
+        at, room = self._room
+        if room - dist(at, (x, y)) < reach:
+            room = float(self._walls_near.gaps(x, y).min(initial=inf))
+            self._room = at, room = (x, y), room
+        is_far = room - dist(at, (x, y)) >= reach
+        if is_far and not near:
+            return None
+        fixed = self._nothing if is_far else self._walls_near
+        return fixed, scene.bodies.chosen(near)
+
+    def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
+        """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
+        s, horizon = self.settings, build_horizon(self.settings)
+        states = horizon.states(np.array(scene.state), inputs)
+        bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
+        followed = Path(states[:, :2], horizon.times, bows, bows)
+        braking = plan_braking(s, states[-1, 2:].tolist())[0]
+        rest = find_stopping_path(states[-1].tolist(), braking, s)
+        return followed.joined(rest._replace(times=rest.times + horizon.times[-1]))
+
+    def _carry(self, path: Path) -> Path:
+        """The way of the disc, if the point that is planned for goes along a `path`."""
+        return path
+
+    def _foresee(self, fixed: Obstacles, bodies: Obstacles, path: Path) -> Outlook:
+        """What follows for these if the disc goes along a `path`, on which it comes to rest."""
+        path = self._carry(path)
+        begin = path.points[0]
+        found = [*fixed.bound(path, are_fixed=True), *bodies.bound(path)]
+        if np.ptp(path.points, axis=0).max() <= AT_REST * self.settings.dt:
+            found[2:] = 2 * [np.zeros(0)]
+        elif bodies.size:
+            places = bodies.groups[0].numbers[:, :2]
+            towards = ((places - begin) @ (path.points - begin).T).max(axis=1)
+            overlaps = bodies.gaps(*begin) + self._spare < 0.0
+            parting = np.where(towards > 0, -towards, inf) - self._spare
+            found[2:] = (np.where(overlaps, parting, each) for each in found[2:])
+        least = (float(each.min(initial=inf)) + self._spare for each in found)
+        wall, wall_seen, body, body_seen = least
+        return Outlook(wall, body, wall_seen, body_seen)
+
     def _find_near(
         self, x: float, y: float, vx: float, vy: float
-    ) -> Sequence[int] | None:
-        """Numbers of the walls that can matter: see `Scene.near`. They are looked for once a metre."""
+    ) -> tuple[int, ...] | None:
+        """Places of what can matter among everything fixed: see `Scene.near`. Looked for once a metre."""
         s, speed = self.settings, max(self.settings.v_max, hypot(vx, vy))
-        if len(self.walls) <= _FEW_WALLS:
+        if len(self._items) <= _FEW:
             return None
         longest = max(s.step_lengths)
         time = s.times[-1] + 2 * longest * s.dt / (1 - (1 - s.gamma) ** longest)
+        time = max(time, 2 * s.dt + speed / s.a_max)  # until it rests
         reach = s.r_robot + s.eps + speed * time
         if reach + dist((x, y), self._near_from) > self._near_reach:
             self._near_from, self._near_reach = (x, y), reach + 1.0
-            self._near = find_near_walls(self.walls, x, y, self._near_reach)
-            self._slots = max(_FEW_WALLS, self._slots, len(self._near))
+            self._near = tuple(self._fixed.find_near(x, y, self._near_reach))
+            self._take_near([self._items[i] for i in self._near])
         return self._near
 
     def _look_ahead(
@@ -303,66 +431,57 @@ class MPCCBF(Controller):
     ) -> tuple[Point, float]:
         """The point of the route that attracts the plan, and the length of the way to the `goal` [m]."""
         s = self.settings
-        if route is None and s.lookahead == np.inf:
+        if route is None and s.lookahead == inf:
             return goal, dist(at, goal)
-        if self._planner is None:
-            self._planner = RoutePlanner(
-                self.walls, find_boxes(self._wall_rows, s.r_robot)
-            )
+        if self._routes is None:
+            self._routes = RoutePlanner(self.walls, find_boxes(self._walls, s))
         if route is None:
-            return self._planner.aim(at, goal, s.lookahead)
-        return self._planner.follow(
-            check_array("route", route, (..., 2)), at, goal, s.lookahead
-        )
+            return self._routes.aim(at, goal, s.lookahead)
+        corners = check_array("route", route, (..., 2))
+        return self._routes.follow(corners, at, goal, s.lookahead)
 
-    def _scene(
+    def _make_scene(
         self,
         state: Sequence[float],
         goal: Point,
         tracked: TrackedPeople,
-        near: Sequence[int] | None = None,
+        near: tuple[int, ...] | None = None,
     ) -> Scene:
-        """What the step is asked, with the zone of every person."""
-        zones = [self.zone_of(person) for person in tracked.people]
-        placed = [
-            place_zone(person, zone)
-            for person, zone in zip(tracked.people, zones, strict=True)
-        ]
-        walls, solids = self._wall_rows, self._solids
+        """What the step is asked, with the zone of every person; `near` as of `Scene`."""
+        s, zones, found = self.settings, self._nothing, list[Ellipse]()
+        if tracked.people:
+            placed = []
+            for person in tracked.people:
+                at, velocity, heading = person.position, person.velocity, person.heading
+                is_usual = person.zone is None and heading is not None
+                found.append(zone := self.zone if is_usual else self.zone_of(person))
+                placed.append(Zone.place(zone, at, heading or 0.0, velocity))
+            offsets = np.full(len(placed), s.r_robot + s.eps)
+            zones = Obstacles((Group(Zone, np.array(placed), offsets),), s.r_robot)
+        near_fixed = self._fixed if near is None else self._near_fixed
         return Scene(
             tuple(state),
             goal,
             tracked,
+            tuple(found),
             zones,
-            placed,
-            walls,
-            self.settings,
-            solids,
+            self._fixed,
+            near_fixed,
+            s,
+            self._solids,
             near,
         )
 
-    def _parameters(
-        self,
-        x: list[float],
-        ahead: Point,
-        scene: Scene,
-        barriers: Sequence[Sequence[float]],
-        size: tuple[int, int],
-    ) -> Array:
-        """Parameters of the problem of this size: see `Problem.parameters`."""
+    def _find_target(self, scene: Scene, ahead: Point) -> Point:
+        """The point that attracts the plan; among unknown people, where full braking ends."""
+        (x, y, vx, vy), s = scene.state, self.settings
         if scene.tracked.unknown:
-            time = max(abs(x[2]), abs(x[3])) / self.settings.a_max
-            target = (
-                x[0] + x[2] * time / 2,
-                x[1] + x[3] * time / 2,
-            )  # where full braking ends
-        else:
-            target = find_target(
-                (x[0], x[1]), ahead, scene.zones, scene.near_walls, self.settings
-            )
-        end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
-        numbers = padded_parameters(x, barriers, scene.near_walls, size)
-        return np.array([*x, *target, *end_velocity, *self._plan[:2], *numbers])
+            time = max(abs(vx), abs(vy)) / s.a_max
+            return x + vx * time / 2, y + vy * time / 2
+        if not scene.people:
+            return ahead
+        zones = scene.zones.groups[0].numbers.tolist()
+        return find_target((x, y), ahead, zones, scene.near_fixed, s)
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.
@@ -375,17 +494,16 @@ class MPCCBF(Controller):
         return circle_around(zone) if person.heading is None else zone
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
-        """h of all `people` and then of all walls at a `position`, shape (people + walls,) [m]."""
+        """h at a `position`: of the zones of `people`, then of everything fixed, shape (obstacles,) [m]."""
         x, y = point = check_point("position", position)
-        scene = self._scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
-        return np.array(scene.h(x, y), float)
+        scene = self._make_scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
+        return scene.barriers.h(x, y)
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
-        """True if h < 0 at the `goal`, because of a wall or of one of `people` who stands."""
+        """True if h < 0 at the `goal`, because of something fixed or of one of `people` who stands."""
         x, y = point = check_point("goal", goal)
-        return self._scene(
-            (x, y, 0.0, 0.0), point, TrackedPeople(tuple(people))
-        ).goal_blocked
+        tracked = TrackedPeople(tuple(people))
+        return self._make_scene((x, y, 0.0, 0.0), point, tracked).goal_blocked
 
     def check_start(
         self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()
@@ -395,33 +513,31 @@ class MPCCBF(Controller):
         Parameters
         ----------
         state : (x, y, vx, vy) [m, m/s], which must keep every barrier and the speed limit.
-        goal : (x, y) [m], which must be free of walls and of people who stand.
+        goal : (x, y) [m], which must be free of everything fixed and of people who stand.
         people : everybody who is present.
         """
         x, y, vx, vy = check_vector("state", state, 4)
-        h, limit = self.barriers((x, y), people), self.settings.v_max
-        if len(h) and h.min() < 0:
-            i = int(h.argmin())
-            obstacle = f"person {i}" if i < len(people) else f"wall {i - len(people)}"
-            raise SolverError(
-                f"the run starts in violation: h = {h[i]:.3f} m for {obstacle} at {[x, y]}; "
-                "start where h >= 0"
-            )
-        if self.goal_blocked(goal, people):
-            raise SolverError(
-                f"the goal {list(check_point('goal', goal))} cannot be reached: it lies in the zone of a "
-                "person who stands; choose one where h >= 0"
-            )
-        if (speed := float(np.hypot(vx, vy))) > limit:
-            raise SolverError(
-                f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s"
-            )
-
-    def _check_goal(self, goal: tuple[float, float]) -> None:
-        h = self.barriers(goal)
+        towards, limit = check_point("goal", goal), self.settings.v_max
+        scene = self._make_scene((x, y, vx, vy), towards, TrackedPeople(tuple(people)))
+        h, at_goal = scene.barriers.h(x, y), self._fixed.h(*towards)
         if (h < 0).any():
             i = int(h.argmin())
             raise SolverError(
-                f"the goal {list(goal)} cannot be reached: it lies too close to the wall "
-                f"{self.walls[i].tolist()} (h = {h[i]:.3f} m); choose one where h >= 0"
+                f"the run starts in violation: h = {h[i]:.3f} m for {scene.name(i)} at {[x, y]}; "
+                "start where h >= 0"
+            )
+        if (at_goal < 0).any():
+            i = int(at_goal.argmin())
+            raise SolverError(
+                f"the goal {list(towards)} cannot be reached: it lies too close to "
+                f"{scene.name(len(people) + i)} (h = {at_goal[i]:.3f} m); choose one where h >= 0"
+            )
+        if scene.goal_blocked:
+            raise SolverError(
+                f"the goal {list(towards)} cannot be reached: it lies in the zone of a person who stands; "
+                "choose one where h >= 0"
+            )
+        if (speed := hypot(vx, vy)) > limit:
+            raise SolverError(
+                f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s"
             )

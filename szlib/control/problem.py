@@ -1,394 +1,418 @@
-"""The optimal control problem of the controller, in symbols, for every solver.
+"""The problem of a step in symbols and matrices: motion, cost, limits, and the conditions on obstacles.
 
-    min over u_0 .. u_{N-1}
-        (x_N - g)' P (x_N - g) + sum_{k=1}^{N-1} m_{k-1} (x_k - g)' Q (x_k - g)
-            + sum_{k=0}^{N-1} m_k u_k' R u_k + j |u_k - u_{k-1}|^2 / m_k
-    subject to
-        x_{k+1} = A_k x_k + B_k u_k,  x_0 given                       double integrator   (paper, eq. 8)
-        -a_max <= u_k <= a_max                                        acceleration        k = 0 .. N-1
-        |(vx, vy)_k|^2 <= v_max^2                                     Euclidean speed     k = 1 .. N
-        h_i(x_{k+1}, t_{k+1}) - (1 - gamma_i)^{m_k} h_i(x_k, t_k) >= 0    each barrier i  k = 0 .. N_h-1
-        (vx, vy)_N = w                                                if there is a terminal condition
-
-(paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., t) takes person i at constant
-velocity, t seconds ahead. Step k takes m_k dt; in the paper m_k = 1, each person and wall has one barrier,
-all gamma_i are the same, and the weight j of jerk is 0. `g` is the target at rest: the goal, except where a
-person is met head-on (`head_on.find_target`); w is 0 or the velocity of a person. The states are eliminated:
-2 N unknowns remain. Each barrier has a price: below `slack_weight`, its rows may be violated, at this price
-for each metre and dt; else they are hard (see `crowding`). The *relaxed* problem adds a slack s >= 0 to each
-hard barrier row, and to the speed rows if the robot is already too fast, and penalises their sum. The penalty
-is exact: if the hard problem has a solution near by, both have the same one. The terminal condition is never
-relaxed.
+`szlib.control.planner` states the problem.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from math import inf
-from threading import RLock
-from time import perf_counter, thread_time
+from functools import cache, lru_cache
+from math import hypot, inf
+from threading import Lock
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from ..checks import Array
-from .barriers import barrier, ellipse_formula, segment_formula
+from .obstacles import Group, Obstacle, Obstacles, Priority
 from .settings import MPCSettings
 
-# Share of a step's time for the hard problem. The second try begins within half of this share, or not at all,
-# so that time is left for the relaxed problem.
-HARD_SHARE = 0.4
-# Held while CasADi's symbols and functions are made or released, because their reference counts are not safe
-# for threads. Functions may run at the same time, each in memory of its own.
-CASADI_LOCK = RLock()
+# Price of a metre of decay without `decay_price`, in the unit of the scaled cost: above every multiplier.
+HARD_PRICE = 1e5
 
 
-@dataclass(frozen=True)
-class Problem:
-    """The problem for a number of people and walls.
+class Question(NamedTuple):
+    """What a plan is made for.
 
     Attributes
     ----------
-    inputs : u_0 .. u_{N-1}, shape (2N,).
-    parameters : the state (4), the target (2), the terminal velocity w (2), the last input u_{-1} (2), then
-        for each barrier of a person the foci and a of the zone, the velocity, gamma and the price (9), then
-        for each wall its end points and its margin (5).
+    state : (x, y, vx, vy) of the robot [m, m/s].
+    target : (x, y), which attracts the plan [m].
+    last : control of the step before [m/s2].
+    zones, fixed : of people, and everything else with a barrier condition.
+    """
+
+    state: Sequence[float]
+    target: Sequence[float]
+    last: Sequence[float]
+    zones: Obstacles
+    fixed: Obstacles
+
+    @property
+    def barriers(self) -> Obstacles:
+        """Everything with a barrier condition."""
+        return self.zones.joined(self.fixed)
+
+
+class Motion(NamedTuple):
+    """The motion and the cost of a plan, in symbols.
+
+    Attributes
+    ----------
+    inputs : u_0 .. u_{N-1}, shape (2, N).
+    given : the state, the target, and the last input, 8 numbers.
     states : x_0 .. x_N, shape (4, N+1).
     cost : of the plan.
-    rows : required to be >= 0: the `n_cbf` barrier conditions, person by person, then wall by wall, and the N
-        speed limits.
-    terminal : required to be 0; empty without a terminal condition.
-    h : a row for each barrier, a column for each of the states x_0 .. x_{N_h}.
-    slope, bend : derivatives of h by the position in that state, (h_x, h_y) and (h_xx, h_xy, h_yy).
-    kept : (1 - gamma_i)^{m_k}, a row for each barrier, a column for each step.
-    prices : of a metre of violation of each of `rows`; `slack_weight` for hard ones.
-    n_cbf : number of barrier conditions.
     """
 
     inputs: Any
-    parameters: Any
+    given: Any
     states: Any
     cost: Any
-    rows: Any
-    terminal: Any
-    h: Any
-    slope: Sequence[Any]
-    bend: Sequence[Any]
-    kept: Any
-    prices: Any
-    n_cbf: int
-
-    @property
-    def violations(self) -> Any:
-        """Violation of each row and of the terminal condition; 0 where they hold."""
-        return ca.vertcat(ca.fmax(0, -self.rows), ca.fabs(self.terminal))
-
-    def is_hard(self, settings: MPCSettings) -> Any:
-        """1 for hard rows and the terminal condition, 0 for rows with a price below that of `settings`."""
-        return ca.vertcat(
-            self.prices >= settings.slack_weight, ca.SX.ones(self.terminal.numel())
-        )
 
 
-@lru_cache(maxsize=256)
-def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
-    """Build the problem of this module's docstring for `settings`, `n_people` and `n_walls`, or reuse it."""
-    s = settings
-    inputs, start, target = (
-        ca.SX.sym("u", 2, s.N),
-        ca.SX.sym("x0", 4),
-        ca.SX.sym("target", 2),
-    )
-    people, walls = ca.SX.sym("person", 9, n_people), ca.SX.sym("wall", 5, n_walls)
-    w, last = ca.SX.sym("w", 2), ca.SX.sym("last", 2)
-
-    states = [start]
+@lru_cache(maxsize=64)
+def build_motion(settings: MPCSettings) -> Motion:
+    """The motion of a double integrator, and the cost, for these `settings`."""
+    s, inputs, given = settings, ca.SX.sym("u", 2, settings.N), ca.SX.sym("given", 8)
+    states = [given[:4]]
     for k, length in enumerate(s.step_lengths):
-        position, velocity, a, dt = (
-            states[-1][:2],
-            states[-1][2:],
-            inputs[:, k],
-            length * s.dt,
-        )
-        states.append(
-            ca.vertcat(position + dt * velocity + 0.5 * dt**2 * a, velocity + dt * a)
-        )
-    x = ca.horzcat(*states)
-
-    lengths = np.array(s.step_lengths, float)
+        position, velocity = states[-1][:2], states[-1][2:]
+        a, dt = inputs[:, k], length * s.dt
+        moved = position + dt * velocity + 0.5 * dt**2 * a
+        states.append(ca.vertcat(moved, velocity + dt * a))
+    x, lengths = ca.horzcat(*states), np.array(s.step_lengths, float)
     weights = ca.DM(np.column_stack([np.zeros(4), np.outer(s.Q, lengths[:-1]), s.P]))
-    error = x - ca.repmat(ca.vertcat(target, 0, 0), 1, s.N + 1)
+    error = x - ca.repmat(ca.vertcat(given[4:6], 0, 0), 1, s.N + 1)
     cost = ca.dot(weights, error**2) + ca.dot(ca.DM(np.outer(s.R, lengths)), inputs**2)
     if s.jerk_weight:
-        change = inputs - ca.horzcat(last, inputs[:, :-1])
-        cost += ca.dot(
-            ca.DM(np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)), change**2
-        )
-
-    h, h_x, h_y, h_xx, h_xy, h_yy = _barriers(
-        s, x[:2, : s.N_h + 1], people[:7, :], walls
-    )
-    kept, prices = _kept_and_prices(s, people[7:, :], n_walls)
-    cbf = ca.vec((h[:, 1:] - kept * h[:, :-1]).T)
-    speed = s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T
-    return Problem(
-        inputs=ca.vec(inputs),
-        parameters=ca.vertcat(start, target, w, last, ca.vec(people), ca.vec(walls)),
-        states=x,
-        cost=cost,
-        rows=ca.vertcat(cbf, speed),
-        terminal=ca.SX(0, 1) if s.terminal == "none" else x[2:, s.N] - w,
-        h=h,
-        slope=(h_x, h_y),
-        bend=(h_xx, h_xy, h_yy),
-        kept=kept,
-        prices=ca.vertcat(ca.vec(prices.T), s.slack_weight * ca.SX.ones(s.N)),
-        n_cbf=cbf.numel(),
-    )
+        change = inputs - ca.horzcat(given[6:], inputs[:, :-1])
+        by_jerk = np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)
+        cost += ca.dot(ca.DM(by_jerk), change**2)
+    return Motion(inputs, given, x, cost)
 
 
-def _kept_and_prices(s: MPCSettings, given: Any, n_walls: int) -> tuple[Any, Any]:
-    """Share of h that a step has to keep, and the price of each row, both of shape (barriers, N_h).
+class Horizon(NamedTuple):
+    """The states are linear in the inputs of each axis.
 
-    `given` : gamma and price of each barrier of a person, shape (2, n).
+    Attributes
+    ----------
+    times : of the states, shape (N+1,) [s].
+    to_positions, to_velocities : of x_1 .. x_N, shape (N, N).
     """
-    keep = ca.vertcat(1 - given[0, :].T, ca.SX(1 - s.gamma) * ca.SX.ones(n_walls))
-    price = ca.vertcat(given[1, :].T, s.slack_weight * ca.SX.ones(n_walls))
-    kept = [keep if m == 1 else keep**m for m in s.step_lengths[: s.N_h]]
-    prices = [
-        ca.if_else(price < s.slack_weight, m * price, price)
-        for m in s.step_lengths[: s.N_h]
-    ]
-    return ca.horzcat(*kept), ca.horzcat(*prices)
+
+    times: Array
+    to_positions: Array
+    to_velocities: Array
+
+    def states(self, state: Array, inputs: Array) -> Array:
+        """States x_0 .. x_N, shape (N+1, 4), from a `state` by `inputs`, shape (N, 2)."""
+        states = np.empty((len(self.times), 4))
+        states[0], ahead = state, self.times[1:, None] * state[2:]
+        states[1:, :2] = state[:2] + ahead + self.to_positions @ inputs
+        states[1:, 2:] = state[2:] + self.to_velocities @ inputs
+        return states
 
 
-def _barriers(s: MPCSettings, at: Any, people: Any, walls: Any) -> list[Any]:
-    """h and its derivatives at positions (2, n), one for each time, each of shape (people + walls, n)."""
-    x, y, time = (ca.SX.sym(name) for name in ("x", "y", "t"))
-    xa, ya, xb, yb, a, vx, vy = person = ca.vertsplit(ca.SX.sym("person", 7))
-    distance = ellipse_formula(x - time * vx, y - time * vy, xa, ya, xb, yb, a)
-    *ends, margin = wall = ca.vertsplit(ca.SX.sym("wall", 5))
-    of_person, of_wall = (
-        barrier(distance, s.r_robot, s.eps),
-        segment_formula(x, y, *ends),
-    )
-    n, found = at.shape[1], [[ca.SX(0, at.shape[1])] for _ in range(6)]
-    for h, of, numbers in (
-        (of_person, person, people),
-        (barrier(of_wall, s.r_robot, margin), wall, walls),
-    ):
-        if count := numbers.shape[1]:
-            once = _differentiated(h, x, y, time, of, s.times, n)
-            values = once.map(count)(ca.repmat(at, 1, count), numbers)
-            for parts, value in zip(found, values, strict=True):
-                parts.append(ca.reshape(value, n, count).T)
-    return [ca.vertcat(*parts) for parts in found]
+@lru_cache(maxsize=64)
+def build_horizon(settings: MPCSettings) -> Horizon:
+    """The matrices of `build_motion` for these `settings`."""
+    motion, n = build_motion(settings), settings.N
+    found = ca.evalf(ca.jacobian(motion.states[[0, 2], 1:], motion.inputs[0, :]))
+    both = np.asarray(found).reshape(n, 2, n)
+    return Horizon(np.array(settings.times), both[:, 0].copy(), both[:, 1].copy())
 
 
-def _differentiated(
-    h: Any, x: Any, y: Any, time: Any, of: Sequence[Any], times: Sequence[float], n: int
+def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
+    """Inputs that bring the robot from `velocity` to rest soonest on its path, within `s`, shape (N, 2)."""
+    vx, vy = velocity
+    plan = list[tuple[float, float]]()
+    for dt in (s.dt * length for length in s.step_lengths):
+        time = max(dt, max(abs(vx), abs(vy)) / s.a_max)
+        plan.append((-vx / time, -vy / time))
+        vx, vy = vx - dt * vx / time, vy - dt * vy / time
+    return np.array(plan)
+
+
+def limit_speed(s: MPCSettings, velocity: Sequence[float], inputs: Array) -> None:
+    """Change `inputs`, shape (N, 2), so that a robot with this `velocity` is at no time too fast, by `s`.
+
+    A robot that is too fast now slows down as it can.
+    """
+    now, time = np.array(velocity), 0.0
+    fastest = hypot(*velocity)
+    for control, length in zip(inputs, s.step_lengths, strict=True):
+        dt = s.dt * length
+        time += dt
+        after = now + dt * control
+        limit = max(s.v_max, fastest - s.a_max * time)
+        after *= min(1.0, limit / (hypot(*after) or 1.0))
+        control[:] = ((after - now) / dt).clip(-s.a_max, s.a_max)
+        now = now + dt * control
+
+
+class Condition(NamedTuple):
+    """A condition on h of an obstacle: h_{k+1} >= keep_k h_k, for each k.
+
+    Attributes
+    ----------
+    level : its priority.
+    keep : share of h to be kept, one for each k.
+    """
+
+    level: Priority
+    keep: tuple[float, ...]
+
+
+@cache
+def list_conditions(
+    settings: MPCSettings, kind: type[Obstacle], has_floors: bool
+) -> tuple[Condition, ...]:
+    """The conditions on an obstacle of a `kind` by the `settings`.
+
+    With the floors of `szlib.control.planner` if it `has_floors`.
+    """
+    s, lengths, found = settings, settings.step_lengths, list[Condition]()
+    stop = min(1.0, s.a_max * s.dt / s.v_max)
+    if not kind.has_barrier:
+        return (Condition(kind.priority, (0.0,) * s.N),)
+    is_wall = has_floors and kind.priority == Priority.WALL
+    if not (is_wall and stop <= s.gamma and s.N_h == s.N):
+        decay = tuple((1 - s.gamma) ** m for m in lengths[: s.N_h])
+        found.append(Condition(Priority.DECAY, decay))
+    if is_wall:
+        stops = tuple((1 - stop) ** m for m in lengths)
+        found.append(Condition(Priority.WALL, stops))
+    elif has_floors:
+        found.append(Condition(Priority.ZONE, (0.0,) * s.N_h))
+    return tuple(found)
+
+
+@lru_cache(maxsize=1024)
+def _linearise_kind(
+    settings: MPCSettings, kind: Any, has_floors: bool, n: int, count: int
 ) -> Any:
-    """A function of n positions at these times and of numbers: h and its derivatives, each (1, n)."""
-    # One variable at a time: these are a fifth fewer instructions than those of `ca.hessian`.
-    h_x, h_y = (ca.jacobian(h, by) for by in (x, y))
-    outputs = [
-        h,
-        h_x,
-        h_y,
-        ca.jacobian(h_x, x),
-        ca.jacobian(h_x, y),
-        ca.jacobian(h_y, y),
+    """(positions, numbers and offsets) -> (bounds, slopes) of all conditions on `n` obstacles of a kind."""
+    horizon, conditions = (
+        build_horizon(settings),
+        list_conditions(settings, kind, has_floors),
+    )
+    n_states = max(len(each.keep) for each in conditions) + 1
+    at, numbers = ca.SX.sym("at", 2, n_states), ca.SX.sym("numbers", count + 1)
+    x, y, t = (ca.SX.sym(name) for name in "xyt")
+    *own, offset = ca.vertsplit(numbers)
+    h = kind.distance(x, y, t, *own) - offset
+    outputs = [h, ca.jacobian(h, ca.vertcat(x, y))]
+    once = ca.Function("h", [x, y, t, numbers], outputs)
+    found = [
+        once(at[0, k], at[1, k], settings.times[k], numbers) for k in range(n_states)
     ]
-    numbers, at = ca.vertcat(*of), ca.SX.sym("at", 2, n)
-    once = ca.Function("h", [ca.vertcat(x, y), numbers, time], outputs)
-    everywhere = zip(
-        *(once(at[:, k], numbers, times[k]) for k in range(n)), strict=True
+    bounds, slopes = list[Any](), list[Any]()
+    for condition in conditions:
+        for k, keep in enumerate(condition.keep):
+            bounds.append(keep * found[k][0] - found[k + 1][0])
+            slope = ca.kron(horizon.to_positions[k], found[k + 1][1])
+            if k and keep:  # the first state is given
+                slope -= keep * ca.kron(horizon.to_positions[k - 1], found[k][1])
+            slopes.append(slope.T)
+    rows = [ca.vertcat(*bounds), ca.densify(ca.horzcat(*slopes))]
+    of_one = ca.Function("rows", [at, numbers], rows, {"cse": True})
+    return of_one.map(n, [True, False], [False, False])
+
+
+@lru_cache(maxsize=64)
+def _linearise_motion(settings: MPCSettings) -> Any:
+    """The part of a quadratic program without obstacles: see `LinearProblem`."""
+    s, (inputs, given, states, cost) = settings, build_motion(settings)
+    horizon, u, n = build_horizon(s), ca.vec(inputs), s.N
+    distance, multipliers = ca.norm_2(given[4:6] - given[:2]), ca.SX.sym("speed", n)
+    scale = 2 / (distance + 1 + ca.fabs(distance - 1))
+    velocity, slowed = (
+        states[2:, 1:],
+        ca.norm_2(given[2:4]) - s.a_max * horizon.times[1:],
     )
-    return ca.Function(
-        "h", [at, numbers], ca.cse([ca.horzcat(*values) for values in everywhere])
-    )
+    # a robot that is too fast slows down as it can
+    limit = ca.fmax(s.v_max, ca.DM(horizon.times[1:]) * 0 + slowed)
+    speed = limit**2 - ca.sum1(velocity**2).T
+    curved = ca.hessian(scale * cost - ca.dot(multipliers, speed), u)[0]
+    if s.terminal == "rest":
+        speed = ca.vertcat(speed, velocity[:, -1])
+    is_end = np.arange(speed.numel()) >= n
+    outputs = [
+        states[:2, :],
+        ca.vertcat(-s.a_max - u, -speed),
+        ca.vertcat(s.a_max - u, ca.if_else(ca.DM(is_end), -speed, 1e30)),
+        ca.jacobian(speed, u).T,
+        curved,
+        scale * ca.gradient(cost, u),
+        scale * cost,
+    ]
+    arguments = [inputs, given, multipliers]
+    dense = [ca.densify(each) for each in outputs]
+    return ca.Function("motion", arguments, dense, {"cse": True})
 
 
-def remaining_distance(x: Any, y: Any, gx: Any, gy: Any) -> Any:
-    """Distance from (`x`, `y`) to the target (`gx`, `gy`) [m], at least 1 m.
+class LinearProblem:
+    """The problem linearised at a plan, in arrays that stay where they are: set `inputs`, then `evaluate`.
 
-    The cost of a metre of slack is `MPCSettings.slack_weight` for each of its metres.
-    """
-    distance = ((gx - x) ** 2 + (gy - y) ** 2) ** 0.5
-    return (distance + 1 + abs(distance - 1)) / 2
-
-
-def dense_function(name: str, arguments: Sequence[Any], outputs: Sequence[Any]) -> Any:
-    """A CasADi function `name` from `arguments` to dense `outputs`."""
-    return ca.Function(
-        name, list(arguments), [ca.densify(output) for output in outputs]
-    )
-
-
-class BufferedFunction:
-    """A CasADi function on fixed arrays: fill the arguments, `call`, read `results`.
-
-    This saves the conversions of an ordinary call, which take ten times as long as these functions.
+    The unknown is the change d of the inputs; the rows are the limits of d, the speed limits, rest at the
+    end, and then the conditions on obstacles: lower <= (d, slopes d) <= upper.
 
     Parameters
     ----------
-    function : the CasADi function.
-    arguments : one array for each of its arguments.
-    last_results : arrays for its last results; for the others it makes some.
+    settings : of the controller.
+    shapes : kind, number and count of numbers of each group of obstacles.
+    has_floors : as of `list_conditions`.
+
+    Attributes
+    ----------
+    inputs, given, multipliers : of the plan, shape (N, 2); see `Motion`; of the speed limits. To be filled.
+    lower, upper, slopes : of the rows.
+    hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
+    first : number of rows before those of obstacles.
+    levels, steps : level of each row of obstacles, and its k.
     """
 
     def __init__(
-        self, function: Any, *arguments: Array, last_results: Sequence[Array] = ()
+        self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
     ) -> None:
-        n_made = function.n_out() - len(last_results)
-        self.results = [
-            *(np.zeros(function.nnz_out(i)) for i in range(n_made)),
-            *last_results,
-        ]
-        buffer, call = function.buffer()
-        for i, array in enumerate(arguments):
-            buffer.set_arg(i, array.data)
-        for i, array in enumerate(self.results):
-            buffer.set_res(i, array.data)
-        self.call = call
-        self._memory = buffer, arguments  # must live as long as `call`
+        s, n, n_first = (
+            settings,
+            2 * settings.N,
+            settings.N + 2 * (settings.terminal == "rest"),
+        )
+        self.first, levels, steps = n + n_first, list[int](), list[int]()
+        for kind, number, _ in shapes:
+            conditions = list_conditions(s, kind, has_floors)
+            levels += number * [c.level for c in conditions for _ in c.keep]
+            steps += number * [k for c in conditions for k in range(len(c.keep))]
+        self.levels, self.steps = np.array(levels, int), np.array(steps, int)
+        rows = self.first + len(levels)
+        self.inputs, self.given, self.multipliers = (
+            np.zeros((s.N, 2)),
+            np.zeros(8),
+            np.zeros(s.N),
+        )
+        self.lower, self.upper = np.zeros(rows), np.full(rows, 1e30)
+        self.slopes = np.zeros((rows - n, n))
+        self.hessian, self.gradient, self.cost = (
+            np.zeros((n, n)),
+            np.zeros(n),
+            np.zeros(1),
+        )
+        self._numbers, positions = list[Array](), np.zeros((s.N + 1, 2))
+        arguments = [self.inputs, self.given, self.multipliers]
+        results = [positions, self.lower, self.upper, self.slopes, self.hessian]
+        results += [self.gradient, self.cost]
+        self._calls = [_call(_linearise_motion(s), arguments, results)]
+        begin = self.first
+        for kind, number, count in shapes:
+            numbers = np.zeros((number, count + 1))
+            function = _linearise_kind(s, kind, has_floors, number, count)
+            results = [self.lower[begin:], self.slopes[begin - n :]]
+            self._calls.append(_call(function, (positions, numbers), results))
+            self._numbers.append(numbers)
+            begin += function.numel_out(0)
+
+    def take(self, groups: Sequence[Group]) -> None:
+        """Take the numbers of `groups` of obstacles of these shapes."""
+        for numbers, group in zip(self._numbers, groups, strict=True):
+            numbers[:, :-1], numbers[:, -1] = group.numbers, group.offsets
+
+    def evaluate(self) -> None:
+        """Fill the arrays at the `inputs`."""
+        for call, _ in self._calls:
+            call()
 
 
-class PlanEvaluation(NamedTuple):
-    """The numbers of a plan.
+def _call(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> Any:
+    """A call of a CasADi function on fixed arrays, and what must live as long.
 
-    Attributes
-    ----------
-    cost : of the plan, without any penalty.
-    slack : largest violation of a hard row or of the terminal condition, 0 if none.
-    inputs : accelerations, shape (2N,) [m/s2].
-    rows : see `Problem`.
-    states : shape (N+1, 4) [m, m/s].
-    h : barriers, shape (people + walls, N_h+1) [m].
+    It saves the conversions of an ordinary call, which take ten times as long as these functions.
     """
+    buffer, call = function.buffer()
+    for i, array in enumerate(arguments):
+        buffer.set_arg(i, array.data)
+    for i, array in enumerate(results):
+        buffer.set_res(i, array.data)
+    return call, (buffer, arguments, results)
 
-    cost: float
-    slack: float
-    inputs: Array
-    rows: Array
-    states: Array
-    h: Array
+
+# Measured on the approach to a person: 7 iterations instead of 9.4, in 0.65 of the time.
+_IPOPT = {
+    "print_level": 0,
+    "sb": "yes",
+    # The start is close to the solution: the plan of the step before, by its trend.
+    "mu_init": 1e-2,
+    "bound_push": 1e-3,
+    "bound_frac": 1e-3,
+    "bound_mult_init_method": "mu-based",
+    # The problem is small and nearly quadratic: leave each barrier subproblem early, step boldly.
+    "barrier_tol_factor": 1e3,
+    "mu_linear_decrease_factor": 0.02,
+    "mu_superlinear_decrease_power": 1.9,
+    "alpha_for_y": "min-dual-infeas",
+    "fast_step_computation": "yes",
+    "min_refinement_steps": 0,
+}
+_CALL_LOCK = (
+    Lock()
+)  # one thread calls IPOPT at a time: it keeps its iterations in memory of its own
 
 
-class PlanEvaluator:
-    """Evaluates any plan, without a solver.
+def solve_by_ipopt(
+    settings: MPCSettings, question: Question, guess: Array
+) -> Array | None:
+    """The inputs that satisfy every row and cost least, by IPOPT as in the paper, shape (N, 2); None if none.
 
     Parameters
     ----------
-    settings, n_people, n_walls : of the problem; `size` holds the last two.
-
-    Attributes
-    ----------
-    find_prices : the function of CasADi from the parameters to the price of each row.
+    settings : of the controller.
+    question : what is asked.
+    guess : inputs to begin with, shape (N, 2) [m/s2].
     """
-
-    def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        with CASADI_LOCK:
-            evaluate, self.find_prices, self.n_cbf = _evaluation(
-                settings, n_people, n_walls
-            )
-            self.n_rows = evaluate.nnz_out(1)
-            self._inputs, self._parameters = (
-                np.zeros(evaluate.nnz_in(0)),
-                np.zeros(evaluate.nnz_in(1)),
-            )
-            self.function = BufferedFunction(evaluate, self._inputs, self._parameters)
-        self.size, self._shape = (
-            (n_people, n_walls),
-            (n_people + n_walls, settings.N_h + 1),
+    s, groups = settings, question.barriers.groups
+    shapes = tuple((g.kind, len(g.offsets), g.numbers.shape[1]) for g in groups)
+    numbers = [np.column_stack([g.numbers, g.offsets]).ravel() for g in groups]
+    given = [*question.state, *question.target, *question.last]
+    with _CALL_LOCK:
+        solver = _build_ipopt(s, shapes)
+        upper = np.full(solver.numel_out("g"), inf)
+        if s.terminal == "rest":
+            upper[-2:] = 0.0
+        found = solver(
+            x0=guess.ravel(),
+            p=np.concatenate([given, *numbers]),
+            lbx=-s.a_max,
+            ubx=s.a_max,
+            lbg=0,
+            ubg=upper,
         )
-        self._numbers = (self._inputs, *self.shaped(*self.function.results[1:]))
-
-    def shaped(
-        self, rows: Array, states: Array, h: Array
-    ) -> tuple[Array, Array, Array]:
-        """Views of the buffers `rows`, `states` and `h`, shaped as in `PlanEvaluation`."""
-        return rows[: self.n_rows], states.reshape(-1, 4), h.reshape(self._shape)
-
-    def __call__(self, plan: Array, parameters: Array) -> PlanEvaluation:
-        self._inputs[:], self._parameters[:] = plan, parameters
-        self.function.call()
-        cost, slack = self.function.results[0].tolist()
-        return PlanEvaluation(cost, slack, *[array.copy() for array in self._numbers])
+        is_solved = bool(solver.stats()["success"])
+    inputs = np.clip(np.asarray(found["x"]).ravel(), -s.a_max, s.a_max)
+    return inputs.reshape(-1, 2) if is_solved else None
 
 
 @lru_cache(maxsize=256)
-def _evaluation(
-    settings: MPCSettings, n_people: int, n_walls: int
-) -> tuple[Any, Any, int]:
-    p = build_problem(settings, n_people, n_walls)
-    slack = ca.mmax(p.violations * p.is_hard(settings))
-    outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
-    prices = dense_function("prices", [p.parameters], [p.prices])
-    return (
-        dense_function("evaluate", [p.inputs, p.parameters], outputs),
-        prices,
-        p.n_cbf,
-    )
-
-
-class TimeBudget:
-    """The time of one step; call `begin` at its start.
-
-    Parameters
-    ----------
-    limit : computing time of the thread [s], or inf.
-    deadline : time of a clock on the wall [s], or inf.
-    """
-
-    def __init__(self, limit: float, deadline: float = inf) -> None:
-        self._limit, self._deadline = limit, deadline
-        self.begin()
-
-    def begin(self, spent: float = 0.0) -> None:
-        """Start to measure; of the deadline so much is `spent` already [s]."""
-        self._wall, self._thread, self._spent = perf_counter(), thread_time(), spent
-
-    def is_spent(self, share: float = 1.0) -> bool:
-        """True if this `share` of the time is used up. The thread's clock is slow, so it is read last."""
-        limit, passed = share * self._limit, perf_counter() - self._wall
-        if passed + self._spent > share * self._deadline:
-            return True
-        return passed > limit and thread_time() - self._thread > limit
-
-
-class ProblemSolver:
-    """Base class of the solvers of this problem.
-
-    Parameters
-    ----------
-    settings, n_people, n_walls : of the problem.
-
-    Attributes
-    ----------
-    evaluate : evaluates any plan.
-    budget : the computing time of a step.
-    timed_out : True if the budget stopped the last call, which then returned its plan so far.
-    """
-
-    def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        self.settings, self.timed_out = settings, False
-        self.budget = TimeBudget(settings.time_limit, settings.deadline)
-        self.evaluate = PlanEvaluator(settings, n_people, n_walls)
-
-    remembered: Array
-    """Multipliers kept from call to call: they save time, and change the answers by rounding only."""
-
-    def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        """The plan that obeys every row, from a `guess`, shape (2N,), and `parameters`; True if found."""
-        raise NotImplementedError
-
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        """The plan of least penalty, from a `guess` and `parameters`; True if it converged."""
-        raise NotImplementedError
-
-    def reset(self) -> None:
-        """Forget the multipliers."""
+def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
+    """The problem in symbols, and its solver."""
+    s, (inputs, given, x, cost) = settings, build_motion(settings)
+    numbers, rows = list[Any](), list[Any]()
+    for kind, n, count in shapes:
+        own = ca.SX.sym(kind.kind, count + 1, n)
+        numbers.append(ca.vec(own))
+        for i in range(n):
+            *each, offset = ca.vertsplit(own[:, i])
+            h = [
+                kind.distance(x[0, k], x[1, k], s.times[k], *each) - offset
+                for k in range(s.N + 1)
+            ]
+            for condition in list_conditions(s, kind, has_floors=False):
+                rows += [
+                    h[k + 1] - keep * h[k] for k, keep in enumerate(condition.keep)
+                ]
+    rows.append(s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T)
+    if s.terminal == "rest":
+        rows.append(x[2:, s.N])
+    # a failure shows in `Step.status`
+    options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
+    options["show_eval_warnings"] = False
+    options |= {f"ipopt.{name}": value for name, value in _IPOPT.items()}
+    options["ipopt.max_iter"] = s.max_iterations
+    for name, limit in (("cpu", s.time_limit), ("wall", s.deadline)):
+        if limit < inf:
+            options[f"ipopt.max_{name}_time"] = limit / 2
+    parameters = ca.vertcat(given, *numbers)
+    problem = {"x": ca.vec(inputs), "p": parameters, "f": cost, "g": ca.vertcat(*rows)}
+    return ca.nlpsol("hard", "ipopt", problem, options)

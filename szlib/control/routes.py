@@ -1,21 +1,24 @@
-"""The way to the goal around walls: shortest paths in a visibility graph.
+"""Where the plan heads: the way around walls, and the side of a person who is met head-on.
+
+The way around walls is a shortest path in a visibility graph.
 
 A wall is replaced by a *box*, the smallest rectangle along the wall that holds every position with h < 0. The
 approximate distance of a wall of length L is below rho = r_robot + margin inside the box of the half sizes
 
     along:   sqrt(L^2 / 4 + L rho)        across:   sqrt(L rho - L^2 / 4),  rho if L >= 2 rho
 
-(`distances.find_safe_boundary` is the curve inside it). A shortest path outside of all boxes turns at their
-corners only, and touches a box there without entering it. The graph of the corners that see each other is
-built once for each set of walls, and the distances of all corners from the goal once for each goal. A step
-then needs to know only which corners the robot sees. Of many walls the graph has those that were in the way
-so far: a shortest path around some walls that crosses no other wall is the shortest around all.
+(`verification.find_safe_boundary` is the curve inside it). A shortest path outside of all boxes turns at
+their corners only, and touches a box there without entering it. The graph of the corners that see each other
+is built once for each set of walls, and the distances of all corners from the goal once for each goal. A
+step then needs to know only which corners the robot sees. Of many walls the graph has those that were in the
+way so far: a shortest path around some walls that crosses no other wall is the shortest around all.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from math import dist, inf
+from math import acos, atan2, cos, dist, hypot, inf, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -26,21 +29,23 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..checks import Array, check_number, check_point, require
 from ..errors import SolverError
-from .barriers import read_walls
+from .obstacles import Obstacles, Wall, Zone, barrier
+from .people import STANDING_SPEED
+from .settings import MPCSettings
+from .walls import read_walls
 
 Point = tuple[float, float]
-_MANY = (
-    64  # walls that are in the graph from the beginning: its building takes some 0.1 s
-)
-_CORNER = 1e-3  # distance of a corner of a route from its box [m]: larger than rounding
+# walls that are in the graph from the beginning: its building takes some 0.1 s
+_MANY = 64
+_CORNER = 1e-3  # distance of a route's corner from its box [m]: more than rounding, less than a robot feels
 _DETOUR = 0.5  # a route is kept until it is this much longer than it was at its best [m] (assumed)
-_GOAL_MOVED = (
-    0.5  # distances from the goal are kept until it has moved this far [m] (assumed)
-)
-_SAMPLES = (
-    33  # points of a user's route of which the farthest visible one is the target
-)
+# distances from the goal are kept until it has moved this far [m] (assumed)
+_GOAL_MOVED = 0.5
+# points of a user's route of which the farthest visible one is the target
+_SAMPLES = 33
 _SEEN = 1 - 1e-9  # share of the way to a point that must be free: all but rounding
+# Where free space is looked for, from a zone's centre to where the robot passes.
+_ALONG = np.linspace(0, 1, 20)
 _SIGNS = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])  # of the corners of a box
 
 
@@ -86,16 +91,17 @@ def find_route(
     )
 
 
-def find_boxes(walls: ArrayLike, r_robot: float) -> Array:
+def find_boxes(walls: Sequence[Wall], settings: MPCSettings) -> Array:
     """Half sizes of the boxes that hold h < 0, along and across each wall, shape (n, 2) [m].
 
     Parameters
     ----------
-    walls : end points and margin of each wall, shape (n, 5) [m].
-    r_robot : radius of the robot [m].
+    walls : the walls.
+    settings : of the robot.
     """
-    xa, ya, xb, yb, margin = np.reshape(np.asarray(walls, float), (-1, 5)).T
-    length, rho = np.hypot(xb - xa, yb - ya), r_robot + margin
+    xa, ya, xb, yb = np.reshape([wall.numbers for wall in walls], (-1, 4)).T
+    margin = np.array([wall.margin(settings) for wall in walls])
+    length, rho = np.hypot(xb - xa, yb - ya), settings.r_robot + margin
     ends, side = np.sqrt(length**2 / 4 + length * rho), np.minimum(length, 2 * rho)
     return np.column_stack([ends, np.sqrt(side * rho - side**2 / 4)])
 
@@ -317,3 +323,138 @@ class RoutePlanner:
         last, length = points[seen[-1]], dist(position, points[0]) + line.length - begin
         reach = dist(p, last) if at[seen[-1]] == line.length else min(lookahead, length)
         return self._stretch(p, last, half, reach), length
+
+
+def find_target(
+    position: tuple[float, float],
+    goal: tuple[float, float],
+    zones: Sequence[Sequence[float]],
+    fixed: Obstacles,
+    settings: MPCSettings,
+) -> tuple[float, float]:
+    """Find the point that attracts the plan [m]: the goal, or one beside a person who is met head-on.
+
+    Parameters
+    ----------
+    position, goal : (x, y) of the robot and of its goal [m].
+    zones : the numbers of the `Zone` of each person.
+    fixed : walls, and whatever else stands still.
+    settings : `head_on_share`, `pass_side`, and what the barriers need.
+
+    Notes
+    -----
+    A person blocks the way if the line to the goal enters the set h < 0, itself an ellipse with the foci of
+    the zone. Its two tangents from the robot lie at the angles +-w about -grad h, the bisector of the
+    directions to the foci (this holds for all confocal ellipses). Let the goal lie at the angle b from there.
+    At b = 0 both ways around are equally long, the optimum is to stand still in front of the person, and
+    every solver stays there for ever. So for |b| <= share * w, with share = `head_on_share`, the target lies
+    along the tangent on `pass_side`, as far away as the goal. Once the robot is on that side, the target
+    turns back to the goal between |b| = share * w and 2 share * w, without a jump. If a wall leaves no space
+    beside the person on that side, the same holds for the other side. If there is no space at all, the
+    target stays the goal, and the robot yields. The paper has no such rule.
+
+    The rule holds only if the barrier is active now, h <= closing speed * dt / gamma, or may become so
+    within the horizon, h <= closing speed * horizon. (With the first condition alone and gamma > 1/N, the
+    slightest tilt of the zone would decide the side before this rule does.) It does not hold for people who
+    walk across the way, because they clear it themselves, nor for a person who stands on the goal. The
+    nearest person counts.
+    """
+    s = settings
+    (x, y), way = position, (goal[0] - position[0], goal[1] - position[1])
+    distance = hypot(*way)
+    if distance == 0 or s.head_on_share == 0:
+        return goal
+    nearest, target = inf, goal
+    for zone in zones:
+        vx, vy = zone[5:7]
+        speed = hypot(vx, vy)
+        if abs(_cross(way, (vx, vy))) > s.head_on_share * speed * distance:
+            continue
+        h = barrier(Zone.distance(x, y, 0.0, *zone), s.r_robot, s.eps)
+        closing = (s.v_max + speed) * s.dt
+        reach = max(closing / s.gamma, closing * sum(s.step_lengths))
+        if h > min(nearest, distance, reach):
+            continue
+        angles = _find_angles(zone, position, way, s)
+        if angles is None:
+            continue
+        nearest, target = h, goal
+        turn = _find_turn(zone, goal, way, *angles, fixed, s)
+        if turn is not None:
+            c, d = cos(turn), sin(turn)
+            target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])
+    return target
+
+
+def _find_angles(
+    zone: Sequence[float],
+    position: tuple[float, float],
+    way: tuple[float, float],
+    s: MPCSettings,
+) -> tuple[float, float] | None:
+    """w, half the angle between the tangents, and b, that of the way from their middle; None on a focus."""
+    (x, y), (xa, ya, xb, yb, *_) = position, zone
+    to_a, to_b = (xa - x, ya - y), (xb - x, yb - y)
+    ra, rb = hypot(*to_a), hypot(*to_b)
+    if ra * rb == 0:
+        return None
+    inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
+    cosine = (ra**2 + rb**2 - 4 * _unsafe_semi_axis(zone, s) ** 2) / (2 * ra * rb)
+    w = acos(max(-1.0, min(1.0, cosine))) / 2
+    return w, atan2(_cross(inward, way), inward[0] * way[0] + inward[1] * way[1])
+
+
+def _find_turn(
+    zone: Sequence[float],
+    goal: tuple[float, float],
+    way: tuple[float, float],
+    w: float,
+    b: float,
+    fixed: Obstacles,
+    s: MPCSettings,
+) -> float | None:
+    """Angle by which the way is turned to a free side, `pass_side` first [rad]; None if it is not turned."""
+    if s.head_on_share * w == 0:
+        return None
+    for left in (s.pass_side == "left", s.pass_side != "left"):
+        lead = (b if left else -b) / (s.head_on_share * w)
+        if not -1 <= lead < 2:
+            continue
+        if _is_side_free(zone, way, left, fixed, s) and not blocks(zone, goal, s):
+            return ((w if left else -w) - b) * min(1.0, 2 - lead)
+    return None
+
+
+def _unsafe_semi_axis(zone: Sequence[float], s: MPCSettings) -> float:
+    """Semi-major axis of the set h < 0 [m]."""
+    return zone[4] + s.r_robot + s.eps
+
+
+def _is_side_free(
+    zone: Sequence[float],
+    way: tuple[float, float],
+    left: bool,
+    fixed: Obstacles,
+    s: MPCSettings,
+) -> bool:
+    """True if nothing fixed stands between the zone's centre and where the robot passes on that side."""
+    length = hypot(*way) if left else -hypot(*way)
+    beside = (-way[1] / length, way[0] / length)
+    xa, ya, xb, yb, *_ = zone
+    half = ((xa - xb) / 2, (ya - yb) / 2)
+    width = sqrt(_unsafe_semi_axis(zone, s) ** 2 - _cross(half, beside) ** 2)
+    x, y = (xa + xb) / 2, (ya + yb) / 2
+    h = fixed.h(x + width * beside[0] * _ALONG, y + width * beside[1] * _ALONG)
+    return bool((h >= 0).all())
+
+
+def blocks(zone: Sequence[float], goal: Point, settings: MPCSettings) -> bool:
+    """True if h < 0 at the `goal` by the `zone` of a person who stands, and these `settings`."""
+    if hypot(*zone[5:7]) >= STANDING_SPEED:
+        return False
+    distance = Zone.distance(*goal, 0.0, *zone)
+    return bool(barrier(distance, settings.r_robot, settings.eps) < 0)
+
+
+def _cross(u: tuple[float, float], v: tuple[float, float]) -> float:
+    return u[0] * v[1] - u[1] * v[0]

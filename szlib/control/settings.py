@@ -20,7 +20,7 @@ TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]
-Terminal = Literal["none", "rest", "person"]
+Terminal = Literal["none", "rest"]
 
 
 def _setting(badge: str, default: Any, **paper: Any) -> Any:
@@ -39,46 +39,6 @@ def _check_numbers(
             value := float(check_array(name, getattr(settings, name), ())),
         )
         _require(holds(value), name, value, expected)
-
-
-@dataclass(frozen=True)
-class Crowding:
-    """What the robot gives up, in which order, where people leave it no way: see `control.crowding`.
-
-    Parameters
-    ----------
-    radius : people within this distance of the robot are near [m].
-    few : from this number of near people on, the decay of h has a price; h >= 0 stays hard.
-    many : from this number of near people on, h has a price altogether, and a gap to bodies is hard.
-    price : of a metre, and 0.1 s, of decay beyond gamma [in the unit of `MPCSettings.slack_weight`].
-    gamma : of a decay that has a price.
-    gap : Euclidean gap of the robot's disc to bodies that stays hard [m].
-
-    Raises
-    ------
-    SolverError : a value is out of its range.
-    """
-
-    radius: float = 4.0
-    few: int = 2
-    many: int = 4
-    price: float = 50.0
-    gamma: float = 0.2
-    gap: float = 0.2
-
-    def __post_init__(self) -> None:
-        _check_numbers(
-            self, "a positive number", lambda v: v > 0, "radius", "price", "gap"
-        )
-        _check_numbers(self, "in (0, 1]", lambda v: 0 < v <= 1, "gamma")
-        for name, least in (("few", 1), ("many", self.few)):
-            value = getattr(self, name)
-            _require(
-                isinstance(value, int) and value >= least,
-                name,
-                value,
-                f"a whole number >= {least}",
-            )
 
 
 @dataclass(frozen=True)
@@ -110,24 +70,25 @@ class MPCSettings:
         Among hundreds of walls a new goal may take a second; a `route` can be given instead (`MPCCBF.step`).
     eps : margin for the error of the approximate distances [m].
     margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
-        least eps (see `wall_margin`). "paper": eps, which allows overlaps with the ends of walls shorter
+        least eps (see `Wall.margin`). "paper": eps, which allows overlaps with the ends of walls shorter
         than r_robot^2 / eps.
     zone_speed : walking speed whose social zone is used, if a zone depends on speed [m/s].
     pass_side : the side on which the robot passes a person whom it meets head-on: "right" or "left".
     head_on_share : a meeting is head-on while the goal lies within this share of the half-angle under which
         the robot sees the person's zone; the rule of the side acts up to twice this share. At most 0.5; 0
-        switches the rule off, as in the paper. See `head_on.find_target`.
-    terminal : what the plan ends in. "none": nothing, as in the paper. "rest": zero velocity. "person": the
-        velocity of the only person, in open space; "rest" unless there is one person. See the proof in
-        `szlib.control.mpc`.
-    crowding : what the robot gives up where people leave it no way. None: nothing, as in the paper.
-    solver : "sqp", the condensed SQP of `szlib.control.solvers.sqp`, or "ipopt", as in the paper.
-    slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)]. The
-        multipliers of the barriers grow with that distance as well.
-    max_iterations : iterations of a solver before the next fallback is tried.
-    time_limit : computing time of the step's thread after which the best plan so far, or full braking, is
-        used [s]; see `Step.timed_out`. `inf` for none. Time of other processes does not count, so that runs
-        are the same on a busy machine.
+        switches the rule off, as in the paper. See `routes.find_target`.
+    terminal : what the plan ends in. "none": nothing, as in the paper. "rest": zero velocity; see the proof
+        in `szlib.control.mpc`.
+    decay_price, zone_price : prices of a metre, and 0.1 s, of decay of h beyond gamma, and of h < 0 of a zone
+        [cost per metre to the goal]. `inf`, as in the paper: violated only where no plan satisfies the row.
+    body_gap : gap to the bodies of people that has priority over zones and decay [m].
+    guard : True: the robot brakes in a step whose plan might end in a wall or a body; see
+        `szlib.control.mpc`. False, as in the paper.
+    solver : "sqp", the quadratic programs of `szlib.control.planner`, or "ipopt", as in the paper.
+    max_iterations : iterations of a solver.
+    time_limit : computing time of the step's thread after which the plan so far is used [s]; see
+        `Step.timed_out`. `inf` for none. Time of other processes does not count, so that runs are the same on
+        a busy machine.
     deadline : the same, counted by a clock on the wall from the call of `step` [s]: for a robot, whose next
         control is due whatever else its computer does. A solver looks at it between two iterations.
 
@@ -166,9 +127,11 @@ class MPCSettings:
     pass_side: Side = _setting("assumed", "right")  # noqa: RUF009
     head_on_share: float = _setting("assumed", 0.25, paper=0.0)
     terminal: Terminal = _setting("paper", "none")  # noqa: RUF009
-    crowding: Crowding | None = _setting("paper", None)  # noqa: RUF009
+    decay_price: float = _setting("paper", np.inf)
+    zone_price: float = _setting("paper", np.inf)
+    body_gap: float = _setting("assumed", 0.0)
+    guard: bool = _setting("measured", True, paper=False)
     solver: Solver = _setting("measured", "sqp", paper="ipopt")  # noqa: RUF009
-    slack_weight: float = _setting("measured", 1e5)
     max_iterations: int = _setting("assumed", 100)
     time_limit: float = _setting("assumed", 0.05, paper=np.inf)
     deadline: float = _setting("assumed", np.inf)
@@ -190,8 +153,6 @@ class MPCSettings:
             )
             object.__setattr__(self, "N", len(grid))
             object.__setattr__(self, "N_h", len(grid))
-        if isinstance(self.crowding, dict):  # of a saved run
-            object.__setattr__(self, "crowding", Crowding(**self.crowding))
         for name in ("N", "N_h", "max_iterations"):
             value = getattr(self, name)
             _require(
@@ -200,10 +161,16 @@ class MPCSettings:
                 value,
                 "a whole number >= 1",
             )
-        positive = "dt", "a_max", "v_max", "zone_speed", "slack_weight"
+        positive = "dt", "a_max", "v_max", "zone_speed"
         _check_numbers(self, "a positive number", lambda v: v > 0, *positive)
         _check_numbers(
-            self, "a number >= 0", lambda v: v >= 0, "r_robot", "eps", "jerk_weight"
+            self,
+            "a number >= 0",
+            lambda v: v >= 0,
+            "r_robot",
+            "eps",
+            "jerk_weight",
+            "body_gap",
         )
         _check_numbers(self, "in (0, 1]", lambda v: 0 < v <= 1, "gamma")
         _check_numbers(self, "in [0, 0.5]", lambda v: 0 <= v <= 0.5, "head_on_share")
@@ -224,6 +191,8 @@ class MPCSettings:
             ("time_limit", "seconds"),
             ("deadline", "seconds"),
             ("lookahead", "metres"),
+            ("decay_price", "cost"),
+            ("zone_price", "cost"),
         ):
             is_positive = (
                 isinstance(value := getattr(self, name), int | float | np.number)
@@ -274,9 +243,9 @@ class MPCSettings:
         """The controller that a robot should run among people, with `changes` by name.
 
         It plans 3 s ahead, in 14 steps with barriers on each, follows a route around walls to a point at
-        most 1 m farther than it can come, and prefers a smooth ride. Where people leave it no way, it does
-        not stop for good, but gives up in the order of `Crowding`, and says so: see `Step.safe` and
-        `Step.explain`. Notebook 12 compares it with the paper's controller.
+        most 1 m farther than it can come, and prefers a smooth ride. A decay of h beyond gamma has a price,
+        and a zone a high one, so that the robot passes where people leave it no other way: see `Step.safe`
+        and `Step.explain`. Notebook 12 compares it with the paper's controller.
 
         Examples
         --------
@@ -287,13 +256,10 @@ class MPCSettings:
         """
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
         reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
-        ahead = {
-            "gamma": 0.08,
-            "grid": grid,
-            "jerk_weight": 8.0,
-            "lookahead": reach + 1.0,
-        }
-        return cls(**{**ahead, "crowding": Crowding(), **changes})
+        own = {"gamma": 0.2, "grid": grid, "jerk_weight": 5.0, "lookahead": reach + 1.0}
+        own |= {"decay_price": 10.0, "zone_price": 400.0, "body_gap": 0.2}
+        own |= {"max_iterations": 8}
+        return cls(**{**own, **changes})
 
     @cached_property
     def step_lengths(self) -> tuple[int, ...]:

@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from ..checks import Array
-from ..control.barriers import euclidean_segment_formula
 from ..control.controller import Controller
-from ..control.person import Person
+from ..control.obstacles import Body, Obstacles
+from ..control.people import Person
 from ..control.settings import MPCSettings
 from ..zones.ellipses import BODY_RADIUS
 from .scenario import Scenario
@@ -44,6 +44,7 @@ class BaselineController(Controller):
 
     def __init__(self, scenario: Scenario, settings: MPCSettings) -> None:
         self.settings, self.walls = settings, scenario.walls
+        self._fixed = Obstacles.of(scenario.fixed, settings)
 
     def step(
         self, state: Array, goal: Array, people: Sequence[Person]
@@ -86,17 +87,10 @@ class BaselineController(Controller):
         people : the people, who walk at constant velocity.
         time : time of each position, shape (...) [s].
         """
-        x, y = at[..., 0], at[..., 1]
-        nearest = np.full(x.shape, np.inf)
-        for (px, py), (vx, vy) in ((p.position, p.velocity) for p in people):
-            nearest = np.minimum(
-                nearest, np.hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS
-            )
-        for wall in self.walls:
-            nearest = np.minimum(
-                nearest, euclidean_segment_formula(x, y, *wall.ravel())
-            )
-        return nearest - self.settings.r_robot - self.settings.eps
+        bodies = (Body(*p.position, *p.velocity) for p in people)
+        obstacles = Obstacles.of(bodies, self.settings).joined(self._fixed)
+        gaps = obstacles.gaps(at[..., 0], at[..., 1], time)
+        return np.asarray(gaps.min(axis=0, initial=np.inf) - self.settings.eps)
 
 
 class StraightController(BaselineController):

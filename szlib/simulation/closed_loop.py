@@ -7,7 +7,7 @@ moves them.  World frame, metres and seconds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import hypot, isfinite
 from time import perf_counter
@@ -18,7 +18,8 @@ import pandas as pd
 
 from ..checks import Array
 from ..control.controller import Controller, as_controller
-from ..control.person import Person, SpeedZone, as_ellipse
+from ..control.obstacles import Obstacle
+from ..control.people import Person, SpeedZone, as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
@@ -43,7 +44,7 @@ _ABSENT = (np.nan,) * 5
 _UNREPORTED = {
     "predicted": np.zeros((0, 4)),
     "residual": None,
-    "fallback": "",
+    "status": "",
     "safe": None,
     "slack": np.nan,
     "stuck": 0.0,
@@ -72,9 +73,9 @@ def simulate(
 
     Raises
     ------
-    SolverError : the controller has other walls, or gives a control that is not finite. For an `MPCCBF` also:
-        the start violates a barrier or the speed limit, or the goal cannot be reached, because it lies too
-        close to a wall or in the zone of a person who stands.
+    SolverError : the controller has other walls or obstacles, or gives a control that is not finite. For an
+        `MPCCBF` also: the start violates a barrier or the speed limit, or the goal cannot be reached, because
+        it lies too close to a wall or in the zone of a person who stands.
 
     Examples
     --------
@@ -93,6 +94,12 @@ def simulate(
             f"the controller knows {len(controller.walls)} walls, and not the {len(scenario.walls)} of "
             f"{scenario.name!r}; build it with walls=scenario.walls"
         )
+    known = getattr(controller, "obstacles", None)
+    if known is not None and _list_numbers(known) != _list_numbers(scenario.obstacles):
+        raise SolverError(
+            f"the controller knows other obstacles than {scenario.name!r}: {list(known)}, and not "
+            f"{list(scenario.obstacles)}; build it with obstacles=scenario.obstacles"
+        )
     try:
         controller.check_start(
             scenario.start, scenario.goal, scenario.people if crowd is None else ()
@@ -100,6 +107,11 @@ def simulate(
     except SolverError as error:
         raise SolverError(f"{scenario.name!r}: {error}") from error
     return drive(scenario, controller, crowd=crowd, max_time=max_time)
+
+
+def _list_numbers(obstacles: Iterable[Obstacle]) -> list[tuple[Any, ...]]:
+    """What makes obstacles the same: their class and their numbers."""
+    return [(type(each), *each.numbers) for each in obstacles]
 
 
 def drive(
@@ -205,9 +217,9 @@ def drive(
         people=_fill_headings(np.reshape(np.array(numbers, float), (n, n_people, 5))),
         predicted=_stack_plans(reported["predicted"]),
         residual=_align_residuals(
-            reported["residual"], seen_by_step, n_people, len(scenario.walls)
+            reported["residual"], seen_by_step, n_people, len(scenario.fixed)
         ),
-        fallback=np.array(reported["fallback"]),
+        status=np.array(reported["status"]),
         safe=np.array(reported["safe"], bool),
         **{
             name: np.array(reported[name], float)
@@ -300,21 +312,21 @@ def _stack_plans(plans: Sequence[Array]) -> Array:
 
 
 def _align_residuals(
-    rows: Sequence[Any], seen: Sequence[list[int]], n_people: int, n_walls: int
+    rows: Sequence[Any], seen: Sequence[list[int]], n_people: int, n_fixed: int
 ) -> Array:
     """The conditions of each step, shape (n, P+W, N_h), NaN for people who were not seen; else (n, P+W, 0).
 
-    A step has a row for each person whom it sees, then for people whom it remembers, then for each wall.
+    A step has a row for each person whom it sees, for people whom it remembers, then for everything fixed.
     """
     if any(row is None for row in rows):
-        return np.zeros((len(rows), n_people + n_walls, 0))
-    residuals = np.full((len(rows), n_people + n_walls, rows[0].shape[1]), np.nan)
+        return np.zeros((len(rows), n_people + n_fixed, 0))
+    residuals = np.full((len(rows), n_people + n_fixed, rows[0].shape[1]), np.nan)
     for residual, row, i in zip(residuals, rows, seen, strict=True):
-        if len(row) < len(i) + n_walls:
+        if len(row) < len(i) + n_fixed:
             raise SolverError(
-                "the residual of a step must have a row for each person it sees, and then for each wall; "
-                f"got {len(row)} rows, expected {len(i) + n_walls}"
+                "the residual of a step must have a row for each person it sees, then for everything fixed; "
+                f"got {len(row)} rows, expected {len(i) + n_fixed}"
             )
         residual[i] = row[: len(i)]
-        residual[n_people:] = row[len(row) - n_walls :]
+        residual[n_people:] = row[len(row) - n_fixed :]
     return residuals

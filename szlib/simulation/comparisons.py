@@ -22,9 +22,9 @@ import numpy as np
 import pandas as pd
 
 from ..checks import Array
-from ..control.distances import euclidean_to_ellipse
-from ..control.person import as_ellipse
+from ..control.people import as_ellipse
 from ..control.settings import MPCSettings
+from ..control.verification import euclidean_to_ellipse
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
@@ -127,12 +127,8 @@ CONTROLLERS: Mapping[str, ControllerFactory] = {
 }
 """Controllers, by name."""
 
-METHOD = (
-    "controller",
-    "zone",
-    "formulation",
-    "behaviour",
-)  # columns of `compare` that name a method
+# columns of `compare` that name a method
+METHOD = ("controller", "zone", "formulation", "behaviour")
 
 WORLDS = Worlds(people=(3, 5), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=1.0)
 """Worlds with space for each of the zones at the start and at the goal: the robot starts outside all."""
@@ -167,9 +163,8 @@ def measure_time_inside(run: Run) -> dict[str, float]:
         gaps = run.distances_to_zones(
             [zone(each) for each in fitted], euclidean_to_ellipse
         )
-        overlaps = (gaps < run.settings.r_robot).any(
-            axis=1
-        )  # NaN, of absent people, is no overlap
+        # NaN, of absent people, is no overlap
+        overlaps = (gaps < run.settings.r_robot).any(axis=1)
         inside[f"inside {name}"] = run.settings.dt * float(overlaps.sum())
     return inside
 

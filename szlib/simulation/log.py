@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
-from ..control.person import Person
+from ..control.obstacles import describe, number_kinds, restore
+from ..control.people import Person
 from ..control.settings import MPCSettings
-from ..control.step import status_of
-from ..errors import DataError
+from ..errors import DataError, SzlibError
 from ..files import write_file
 from ..input_files import open_regular, read_small
 from ..zones.ellipses import Ellipse
@@ -27,9 +27,9 @@ from .scenario import Scenario
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FORMAT, _VERSION = "szlib.SimulationLog", 4
+_FORMAT, _VERSION = "szlib.SimulationLog", 5
 _ARRAYS = (
-    "states", "controls", "people", "predicted", "residual", "fallback", "safe", "slack", "solve_time",
+    "states", "controls", "people", "predicted", "residual", "status", "safe", "slack", "solve_time",
     "stuck",
 )  # fmt: skip
 _SHOWN = (
@@ -46,7 +46,7 @@ class SimulationLog(Run):
     """The log of one run, with a table, metrics, pictures and files.
 
     `szlib.simulate` returns it.  Its arrays are those of `szlib.simulation.Run`: `scenario`, `settings`,
-    `zones`, `states`, `controls`, `people`, `predicted`, `residual`, `fallback`, `safe`, `slack`,
+    `zones`, `states`, `controls`, `people`, `predicted`, `residual`, `status`, `safe`, `slack`,
     `solve_time`, `stuck`, `arrival`, `has_safety_claims`, `inputs`.
 
     Examples
@@ -67,8 +67,9 @@ class SimulationLog(Run):
     def table(self) -> pd.DataFrame:
         """One row for each step: the state at its time and the control decided there.
 
-        Columns: t [s], x, y [m], vx, vy, speed [m/s], ax, ay [m/s2] (or `inputs`), status, fallback, slack,
-        solve_time, stuck [s], cbf_people [m], clearance (the smallest) [m], and for each person i and wall j:
+        Columns: t [s], x, y [m], vx, vy, speed [m/s], ax, ay [m/s2] (or `inputs`), status, slack,
+        solve_time, stuck [s], cbf_people [m], clearance (the smallest) [m], and for each person i and wall j,
+        or another kind of obstacle in place of wall:
         person_i_x, person_i_y [m], person_i_heading [rad], h_person_i, h_wall_j [m].
         """
         n = len(self.zones)
@@ -78,13 +79,8 @@ class SimulationLog(Run):
         }
         columns |= dict(zip(self.inputs, self.controls.T, strict=True))
         columns |= {
-            "status": [status_of(name) for name in self.fallback.tolist()],
-            "fallback": self.fallback,
-        }
-        columns |= {
-            "slack": self.slack,
-            "solve_time": self.solve_time,
-            "stuck": self.stuck,
+            name: getattr(self, name)
+            for name in ("status", "slack", "solve_time", "stuck")
         }
         columns["cbf_people"] = self.cbf_people
         columns["clearance"] = nanmin(self.clearance, axis=1)
@@ -96,9 +92,8 @@ class SimulationLog(Run):
                 f"person_{i}_heading": heading,
             }
             columns[f"h_person_{i}"] = self.h[:, i]
-        columns |= {
-            f"h_wall_{j}": self.h[:, n + j] for j in range(len(self.scenario.walls))
-        }
+        names = number_kinds(self.scenario.fixed)
+        columns |= {f"h_{name}": self.h[:, n + j] for j, name in enumerate(names)}
         return pd.DataFrame(columns)
 
     def metrics(self) -> dict[str, Any]:
@@ -122,7 +117,7 @@ class SimulationLog(Run):
         numbers = ", ".join(f"{name} {_format(metrics[name])}" for name in _SHOWN)
         return (
             f"SimulationLog of {self.scenario.name!r}: {len(self.states)} states in {self.time[-1]:g} s, "
-            f"{len(self.zones)} people, {len(self.scenario.walls)} walls\n  {numbers}"
+            f"{len(self.zones)} people, {len(self.scenario.fixed)} obstacles\n  {numbers}"
         )
 
     def _repr_html_(self) -> str:
@@ -165,7 +160,8 @@ class SimulationLog(Run):
             | {
                 name: getattr(scenario, name).tolist()
                 for name in ("start", "goal", "walls")
-            },
+            }
+            | {"obstacles": [describe(each) for each in scenario.obstacles]},
             "people": [
                 _pick(person, "position", "velocity", "heading") for person in people
             ],
@@ -204,11 +200,13 @@ class SimulationLog(Run):
                 Person(**person, zone=zones[i] if i < len(zones) else None)
                 for i, person in enumerate(content["people"])
             )
-            scenario = Scenario(**content["scenario"], people=people)
+            own = content["scenario"]
+            own["obstacles"] = [restore(each) for each in own["obstacles"]]
+            scenario = Scenario(**own, people=people)
             settings = MPCSettings(**content["settings"])
             content["run"]["inputs"] = tuple(content["run"]["inputs"])
             return cls(scenario, settings, zones, **arrays, **content["run"])
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except (OSError, KeyError, TypeError, ValueError, SzlibError) as error:
             raise DataError(
                 f"{stem}: cannot be read as a run ({error!r}); expected the two files of SimulationLog.save"
             ) from error

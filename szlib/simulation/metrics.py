@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..checks import Array
 from ..control.settings import TOLERANCE
-from ..control.step import FALLBACKS
+from ..control.step import STATUSES
 from .outcomes import classify_outcome
 from .run import Run, nanmin
 from .scenario import GOAL_RADIUS, STOPPED_SPEED
@@ -23,9 +23,8 @@ from .scenario import GOAL_RADIUS, STOPPED_SPEED
 START_UP_TIME = 1.0  # time after the start that does not count as slow or yielding [s]: v_max / a_max
 # The robot brakes into its goal after it last has this fraction of its greatest speed (assumed).
 CRUISE_FRACTION = 0.95
-ACTIVE_RESIDUAL = (
-    1e-4  # a barrier condition with at most this residual holds the robot back [m]
-)
+# a barrier condition with at most this residual holds the robot back [m]
+ACTIVE_RESIDUAL = 1e-4
 
 # Metrics of `Step.solve_time`, each with its quantile.
 SOLVE_TIMES = {
@@ -45,7 +44,8 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     outcome : how the run ends; see `classify_outcome`.
     time_to_goal : time of the arrival; NaN without success.
     path_length : length of the polygon through the robot's positions until the arrival.
-    min_h, min_h_people, min_h_walls : smallest h at any state, with the true positions of people.
+    min_h, min_h_people, min_h_walls : smallest h at any state, with the true positions of people; walls are
+        everything fixed.
     min_clearance, min_clearance_people, min_clearance_walls : smallest Euclidean gap from the robot's disc
         to a person's body or to a wall; negative is an overlap.
     min_speed, mean_speed, max_speed : speed of the robot until the arrival; min_speed after the start-up and
@@ -54,15 +54,15 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     time_yielding : see `find_yielding_steps`; NaN if the controller does not report its conditions.
     passing_side : "right", "left" or "none"; see `find_passing_side`.
     jerk : mean squared change of acceleration over time, until the arrival [m2/s6].
-    people, walls : number of each.
+    people, walls : number of people, and of everything fixed.
     violations, overlaps : all steps that lead to h < 0, or to a Euclidean overlap.
-    infeasible_steps : steps whose plan violates the hard problem.
+    infeasible_steps : steps whose plan violates a row without a price.
     claimed_safe_steps : steps with a safety claim; 0 for a controller without claims.
     flagged_steps : steps that are reported as not safe; 0 for a controller without claims.
     unflagged_violations : steps with a safety claim that lead to h < 0.
     unflagged_overlaps : steps with a safety claim that lead to a Euclidean overlap.
-    steps_warm, steps_cold, steps_kept, steps_relaxed, steps_braking : steps of each `Step.fallback`.
-    max_slack : largest violation of a hard constraint by any plan; NaN if the controller reports none.
+    steps_optimal, steps_relaxed, steps_restarted, steps_braking : steps of each `Step.status`.
+    max_slack : largest violation of a row without a price by any plan; NaN if the controller reports none.
     solve_time_median, solve_time_p95, solve_time_p99, solve_time_max : of `Step.solve_time`, or of the call.
 
     Notes
@@ -110,7 +110,7 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "passing_side": find_passing_side(run),
         "jerk": float((jerk**2).sum(axis=1).mean()) if len(jerk) else 0.0,
         "people": n_people,
-        "walls": len(run.scenario.walls),
+        "walls": len(run.scenario.fixed),
         "violations": int(violated.sum()),
         "overlaps": int(overlap.sum()),
         "infeasible_steps": int((run.slack[applied] > TOLERANCE).sum()),
@@ -119,8 +119,8 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "unflagged_violations": int((run.safe[applied] & violated).sum()),
         "unflagged_overlaps": int((run.safe[applied] & overlap).sum()),
         **{
-            f"steps_{name}": int((run.fallback[applied] == name).sum())
-            for name in FALLBACKS
+            f"steps_{name}": int((run.status[applied] == name).sum())
+            for name in STATUSES
         },
         "max_slack": float(run.slack[applied].max(initial=0.0)),
         **dict(zip(SOLVE_TIMES, solve_times, strict=True)),

@@ -12,10 +12,8 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from threading import get_ident
 from types import FunctionType
 from typing import Any
 
@@ -51,9 +49,8 @@ ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
 # Makes the scenario of a seed, the same one each time: `Worlds` or another function.
 ScenarioSource = Callable[[int], Scenario]
 
-Measure = Callable[
-    [Run], dict[str, float]
-]  # further columns of a row; a function of a module
+# further columns of a row; a function of a module
+Measure = Callable[[Run], dict[str, float]]
 
 
 def make_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
@@ -61,8 +58,8 @@ def make_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
     return MPCCBF(
         DEFAULT_ZONE,
         walls=scenario.walls,
+        obstacles=scenario.obstacles,
         settings=settings,
-        max_people=len(scenario.people),
     )
 
 
@@ -89,8 +86,7 @@ def rollouts(
     settings : settings of the controller and the loop; default: `MPCSettings()`.
     worlds : `Worlds`, or another function of the seed that makes scenarios; default: `Worlds()`.
     behaviour : what people do: `Behaviour`, or another `CrowdModel`; default: they walk on.
-    controller : makes the controller for a scenario with these settings; default: `make_mpc_cbf`, where
-        worlds with the same numbers of people and walls share one controller.
+    controller : makes the controller for a scenario with these settings; default: `make_mpc_cbf`.
     zone_transform : makes the zone that the robot keeps out of from each person's own zone.
     measure : further columns from each run.
     out : folder for finished chunks; a later call continues from them. Default: no files. The parameters and
@@ -134,30 +130,6 @@ def rollouts(
             tables.append(table)
             bar.update(len(table))
     return pd.concat(tables).sort_values("seed", ignore_index=True)
-
-
-@lru_cache(maxsize=1)
-def _controllers_of(
-    settings: MPCSettings, thread: int
-) -> dict[tuple[int, int], MPCCBF]:
-    """The controllers of one thread for these settings, kept from chunk to chunk."""
-    return {}
-
-
-def reuse_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
-    """As `make_mpc_cbf`, but a `scenario` shares the controller of the last one of its size for `settings`.
-
-    The size is the numbers of people and walls. To build a controller takes as long as ten steps. The loop
-    resets it before each run, so that it remembers nothing of the last world.
-    """
-    controllers, size = (
-        _controllers_of(settings, get_ident()),
-        (len(scenario.people), len(scenario.walls)),
-    )
-    if size not in controllers:
-        controllers[size] = make_mpc_cbf(scenario, settings)
-    controllers[size].set_walls(scenario.walls)
-    return controllers[size]
 
 
 @dataclass(frozen=True)
@@ -244,8 +216,6 @@ def run_chunk(
     key = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
     if file is not None and (content := load_cached(file, key)) is not None:
         return pd.read_parquet(io.BytesIO(content))
-    if setup.controller is make_mpc_cbf:
-        setup = replace(setup, controller=reuse_mpc_cbf)
     rows = []
     for seed in seeds:
         log = setup.run(seed)

@@ -7,8 +7,7 @@ from typing import Literal
 import numpy as np
 from scipy.ndimage import label
 
-from ..control.barriers import compute_h
-from ..control.distances import walls_with_margins
+from ..control.obstacles import Obstacles, Zone
 from ..control.settings import TOLERANCE
 from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
@@ -24,9 +23,8 @@ Outcome = Literal[
     "out of time",
 ]
 """How a run ends; see `classify_outcome`."""
-CROWDED_H = (
-    0.2  # if two barriers are below this h, the robot has no way out [m] (assumed)
-)
+# if two barriers are below this h, the robot has no way out [m] (assumed)
+CROWDED_H = 0.2
 STOP_WINDOW = 3.0  # a robot that stands for this time at the end of a run has stopped for good [s] (assumed)
 _CELL = 0.1  # cell size of the grid for the search of a free path to the goal [m]
 _MARGIN = 2.5  # margin of the grid around everything: enough for a zone and the robot beside it [m]
@@ -86,14 +84,15 @@ def _has_free_path(run: Run) -> bool:
     axes = [np.arange(low[i], high[i], _CELL) for i in range(2)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     s = run.settings
-    zones = [
-        (*zone.placed((x, y), heading).foci_and_axis, 0.0, 0.0)
-        for zone, (x, y, heading, *_) in people
-    ]
-    walls = walls_with_margins(run.scenario.walls, s)
-    h = compute_h(
-        grid[..., 0], grid[..., 1], zones, walls, r_robot=s.r_robot, eps=s.eps
+    x, y = grid[..., 0], grid[..., 1]
+    zones = Obstacles.of(
+        (
+            Zone(*Zone.place(zone, (px, py), heading, (0.0, 0.0)))
+            for zone, (px, py, heading, *_) in people
+        ),
+        s,
     )
+    h = [*zones.h(x, y), *run.fixed.h(x, y)]
     is_free = nanmin(np.array([np.ones(grid.shape[:2]), *h]), axis=0) >= 0
     regions = label(is_free, structure=np.ones((3, 3)))[0]
     cells = np.round((ends - low) / _CELL).astype(int)

@@ -18,7 +18,7 @@ import pandas as pd
 
 from ..checks import Array
 from ..control.controller import Controller
-from ..control.person import Person
+from ..control.people import Person
 from ..control.settings import MPCSettings
 from ..encounters.areas import area_for
 from ..encounters.geometry import Area

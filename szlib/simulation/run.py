@@ -14,14 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Array
-from ..control.barriers import (
-    barrier,
-    ellipse_distance,
-    euclidean_segment_formula,
-    segment_formula,
-)
-from ..control.distances import walls_with_margins
-from ..control.person import Person
+from ..control.obstacles import Obstacles, barrier, ellipse_distance
+from ..control.people import Person
 from ..control.settings import MPCSettings
 from ..errors import DataError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
@@ -37,8 +31,8 @@ def nanmin(values: Array, axis: int | tuple[int, ...] | None = None) -> Array:
 class Run:
     """One run in n states, dt apart, each with the step that the controller decided there.
 
-    P is the number of people, W the number of walls.  Arrays that belong to people and walls have the people
-    first.  A value of a person who is absent is NaN.
+    P is the number of people, W that of walls and other obstacles.  Arrays that belong to both have the
+    people first, in the order of `Step.h`.  A value of a person who is absent is NaN.
 
     Attributes
     ----------
@@ -52,9 +46,9 @@ class Run:
     predicted : plan of each step, shape (n, N+1, 4); (n, 0, 4) if the controller reports none.
     residual : `Step.residual`, shape (n, P+W, N_h) [m]; NaN for people whom the controller did not see;
         (n, P+W, 0) if the controller reports none.
-    fallback : `Step.fallback`, shape (n,); "" if the controller reports none.
+    status : `Step.status`, shape (n,); "" if the controller reports none.
     safe : `Step.safe`, shape (n,): True is a safety claim.
-    slack : largest violation of a hard constraint by each plan, shape (n,); NaN if not reported.
+    slack : largest violation of a row without a price by each plan, shape (n,); NaN if not reported.
     solve_time : time of each step, shape (n,) [s]: as reported, else the duration of the call.
     stuck : time without progress at each step, `Step.stuck`, shape (n,) [s]; 0 if not reported.
     arrival : index of the first state at rest at the goal; None if there is none.
@@ -70,7 +64,7 @@ class Run:
     people: Array
     predicted: Array
     residual: Array
-    fallback: NDArray[np.str_]
+    status: NDArray[np.str_]
     safe: NDArray[np.bool_]
     slack: Array
     solve_time: Array
@@ -130,28 +124,25 @@ class Run:
         return values
 
     @cached_property
+    def fixed(self) -> Obstacles:
+        """Walls and other obstacles that stand still, for this robot."""
+        return Obstacles.of(self.scenario.fixed, self.settings)
+
+    @cached_property
     def h(self) -> Array:
         """Barriers with the true positions of people, shape (n, P+W) [m]."""
-        s, (x, y) = self.settings, (self.states[:, :1], self.states[:, 1:2])
-        *ends, margin = np.reshape(
-            walls_with_margins(self.scenario.walls, s), (-1, 5)
-        ).T
-        to_people = barrier(
-            self.distances_to_zones(self.zones, ellipse_distance), s.r_robot, s.eps
-        )
-        return np.hstack(
-            [to_people, barrier(segment_formula(x, y, *ends), s.r_robot, margin)]
-        )
+        s, (x, y, *_) = self.settings, self.states.T
+        distances = self.distances_to_zones(self.zones, ellipse_distance)
+        to_people = barrier(distances, s.r_robot, s.eps)
+        return np.hstack([to_people, self.fixed.h(x, y).T])
 
     @cached_property
     def clearance(self) -> Array:
-        """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and walls, shape (n, P+W) [m]."""
-        to_people = np.hypot(self.relative[..., 0], self.relative[..., 1]) - BODY_RADIUS
-        x, y = self.states[:, :1], self.states[:, 1:2]
-        to_walls = euclidean_segment_formula(
-            x, y, *self.scenario.walls.reshape(-1, 4).T
-        )
-        return np.hstack([to_people, to_walls]) - self.settings.r_robot
+        """Euclidean gaps from the disc to bodies (of `BODY_RADIUS`) and obstacles, shape (n, P+W) [m]."""
+        away = np.hypot(self.relative[..., 0], self.relative[..., 1])
+        to_people = away - BODY_RADIUS - self.settings.r_robot
+        x, y, *_ = self.states.T
+        return np.hstack([to_people, self.fixed.gaps(x, y).T])
 
     @cached_property
     def cbf_people(self) -> Array:

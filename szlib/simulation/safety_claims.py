@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ..checks import Array
-from ..control.barriers import barrier, ellipse_distance
+from ..control.obstacles import barrier, ellipse_distance
 from ..control.settings import TOLERANCE
 from ..encounters.geometry import wrap_angle
 from .run import Run
@@ -32,7 +32,7 @@ def safety_violations(run: Run) -> pd.DataFrame:
     Returns
     -------
     t : time of the state with h < 0 [s].
-    person : index of the person or wall; people before walls.
+    person : place of the person or obstacle in `Run.h`.
     h : h at that state [m].
     h_claimed : h if the person keeps their velocity and heading [m]; NaN for a person who was absent.
     deviation : distance of the person from the position at constant velocity [m].

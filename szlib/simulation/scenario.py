@@ -13,8 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..checks import Array, check_array, require
-from ..control.barriers import check_wall
-from ..control.person import Person
+from ..control.obstacles import Obstacle, Wall, check_wall
+from ..control.people import Person
 from ..errors import SolverError
 
 GOAL_RADIUS = 0.1  # the robot has arrived within this distance of the goal [m], when it has stopped (assumed)
@@ -45,7 +45,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scene: the robot's start and goal, people and walls.
+    """A scene: the robot's start and goal, people, walls, and other obstacles.
 
     Parameters
     ----------
@@ -57,6 +57,7 @@ class Scenario:
     claims : what the paper claims of it.
     title : title of its figures.
     duration : time limit of a run [s].
+    obstacles : what else stands still, such as a `HalfPlane`.
 
     Raises
     ------
@@ -79,6 +80,7 @@ class Scenario:
     claims: tuple[Claim, ...] = ()
     title: str = ""
     duration: float = 60.0
+    obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
         arrays = {
@@ -92,6 +94,7 @@ class Scenario:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "people", tuple(self.people))
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
         is_positive = 0 < self.duration < np.inf
         require(
             is_positive,
@@ -100,6 +103,12 @@ class Scenario:
             "a positive number of seconds",
             SolverError,
         )
+
+    @property
+    def fixed(self) -> tuple[Obstacle, ...]:
+        """Everything that stands still: the walls, then the other obstacles."""
+        walls = (Wall(*ends) for ends in self.walls.reshape(-1, 4).tolist())
+        return (*walls, *self.obstacles)
 
     def turn_people(self) -> Scenario:
         """The same scene with all people facing the other way; people who walk then walk backwards."""

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Array
-from ..control.barriers import ellipse_distance
-from ..control.distances import euclidean_to_segment
+from ..control.obstacles import ellipse_distance
 from ..encounters.geometry import wrap_angle
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .metrics import measure_path_length
@@ -81,10 +80,7 @@ def _sum_heading_changes(states: Array) -> float:
 def _compute_path_efficiency(run: Run, states: Array) -> float:
     start, goal = run.scenario.start[:2], run.scenario.goal
     straight = start + np.linspace(0, 1, _N_POINTS)[:, None] * (goal - start)
-    radius = run.settings.r_robot
-    if not run.success or any(
-        euclidean_to_segment(straight, *w).min() < radius for w in run.scenario.walls
-    ):
+    if not run.success or (run.fixed.gaps(*straight.T) < 0).any():
         return np.nan
     driven, rest = (
         measure_path_length(states[:, :2]),
@@ -134,9 +130,8 @@ def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, f
     path, n_people = run.states[way, :2], len(run.zones)
     length, straight = measure_path_length(path), float(np.hypot(*(path[-1] - path[0])))
     zones = run.zones if zone is None else (zone,) * n_people
-    inside = (
-        run.distances_to_zones(zones, ellipse_distance)[way] < 0
-    )  # NaN, of absent people, is not inside
+    # NaN, of absent people, is not inside
+    inside = run.distances_to_zones(zones, ellipse_distance)[way] < 0
     distance = np.hypot(run.relative[way, :, 0], run.relative[way, :, 1])
     reached = len(rows) > 0
     return {

@@ -21,22 +21,11 @@ costmaps              zones around people as a costmap, for navigation stacks
 pooling               a quantity of the zones of several sites, pooled: `pool`
 reference_zones       zones of real people that szlib ships: `reference_zone`
 sensitivity           the zone with each parameter of the method varied alone
+
+`__init__.pyi` beside this file lists the names. Each is imported when it is first used: a robot that needs an
+`Ellipse` loads no pandas.
 """
 
-from .costmaps import Grid, draw_costmap
-from .ellipses import BODY_RADIUS, Ellipse, circle_around
-from .enclosing_ellipse import (
-    minimum_enclosing_ellipse,
-    minimum_enclosing_ellipse_of_curve,
-)
-from .hulls import HullZone, hull_vertices, slice_hull
-from .imposed_zone import PairedSamples, impose_zone
-from .occupancy import PairCorrelation, pair_correlation
-from .outliers import complementary_points, is_outlier, remove_outliers
-from .polar import PolarZone
-from .pooling import Pooled, pool
-from .reference_zones import ReferenceZone, reference_zone
-from .respect_profile import RespectRadius
-from .respect_significance import NullTest, null_test
-from .social_zone import SocialZone
-from .uncertainty import count_by_side
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -5,11 +5,10 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 import do_mpc
 import numpy as np
-from szlib.control.obstacles import barrier, cbf_residual, ellipse_formula
-from szlib.control.people import place_zone
 
 import szlib
 from szlib.checks import Array
+from szlib.control.obstacles import Zone, barrier, cbf_residual, ellipse_formula
 
 
 def do_mpc_step(
@@ -55,9 +54,10 @@ def do_mpc_step(
     def predictions(_: float) -> object:
         for k in range(s.N + 1):
             template["_tvp", k, "target"] = known["target"]
+            later = [known["person"].after(j * s.dt) for j in (k, k + 1)]
             seen = [
-                place_zone(known["person"].after(j * s.dt), zone)[:5]
-                for j in (k, k + 1)
+                Zone.place(zone, p.position, p.heading or 0.0, p.velocity)[:5]
+                for p in later
             ]
             template["_tvp", k, "here"], template["_tvp", k, "after"] = (
                 np.array(each) for each in seen

@@ -3,23 +3,26 @@
 import copy
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from szlib.control.obstacles import ellipse_distance, segment_distance
-from szlib.control.verification import euclidean_to_ellipse, euclidean_to_segment
 
 import szlib
 from szlib.control.differential_drive import Unicycle
+from szlib.control.obstacles import ellipse_distance, segment_distance
 from szlib.control.settings import TOLERANCE
+from szlib.control.verification import euclidean_to_ellipse, euclidean_to_segment
 from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone
 from szlib.zones.ellipses import BODY_RADIUS
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
-OPEN = (6.0, 1.0)
+OPEN, GOAL = (6.0, 1.0), (4.0, 0.0)
+FACING = szlib.Person((0.0, 0.0), heading=np.pi)
+AT_LEISURE = szlib.MPCSettings(time_limit=np.inf)
 
 
 def drives(seed):
@@ -37,7 +40,6 @@ def drives(seed):
             settings=settings,
             omega_max=rng.uniform(0.5, 8.0),
             ahead=ahead,
-            max_people=0,
         )
 
 
@@ -84,7 +86,7 @@ def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limit
         angle = rng.uniform(-np.pi, np.pi)
         start = point_of(own, drive.ahead)
         end = start + way * np.array([np.cos(angle), np.sin(angle)])
-        (_, reached), (control,) = drive._follow(own, end[None])
+        (_, reached), (control,) = drive._wheels.follow(own, end[None], [s.dt])
         v, omega = control
         assert abs(v) <= s.v_max * (1 + 1e-12)
         assert abs(omega) <= drive.omega_max * (1 + 1e-12)
@@ -112,7 +114,7 @@ def test_the_chord_error_and_the_limits_are_attained():
                 drive.ahead + drive.v_max * dt * np.cos(side),
                 drive.v_max * dt * np.sin(side),
             ]
-            _, (control,) = drive._follow(np.zeros(5), np.array([end]))
+            _, (control,) = drive._wheels.follow(np.zeros(5), np.array([end]), [dt])
             assert control[1] == pytest.approx(drive.omega_max)
             points = point_of(
                 integrate(np.zeros(3), control, dt, [0, dt / 2, dt]), drive.ahead
@@ -133,7 +135,7 @@ def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
             [-1, 1], rng.uniform(-1, 1, 2)
         ) * rng.choice([0.1, 2.0])
         drive = szlib.DifferentialDrive(
-            ZONE, walls=[wall], settings=s, ahead=rng.uniform(0.1, 0.6), max_people=0
+            ZONE, walls=[wall], settings=s, ahead=rng.uniform(0.1, 0.6)
         )
         person = szlib.Person(
             tuple(rng.uniform(-2, 2, 2)),
@@ -205,9 +207,7 @@ def test_the_drive_reaches_its_goal_past_a_person_from_any_heading(heading):
 
 
 def test_every_step_is_safe_where_there_is_nobody_and_no_wall():
-    _, steps = loop(
-        szlib.DifferentialDrive(ZONE, max_people=0), np.zeros(5), OPEN, steps=3
-    )
+    _, steps = loop(szlib.DifferentialDrive(ZONE), np.zeros(5), OPEN, steps=3)
     assert all(step.safe for step in steps)
 
 
@@ -228,7 +228,7 @@ def test_the_disc_stays_clear_between_samples_after_every_safe_step():
             )
             for _ in range(3)
         ]
-        drive = szlib.DifferentialDrive(ZONE, walls=[wall], max_people=3)
+        drive = szlib.DifferentialDrive(ZONE, walls=[wall], settings=AT_LEISURE)
         own = Unicycle(rng.uniform(-np.pi, np.pi)).start(
             [-2.0, rng.uniform(-2, 2), 0.0, 0.0]
         )
@@ -259,14 +259,12 @@ def test_the_disc_stays_clear_between_samples_after_every_safe_step():
 def test_plans_that_end_at_rest_stay_feasible_among_standing_people():
     """Recursive feasibility, proved of the double integrator in `szlib.control.mpc`, holds of the wheels."""
     settings, quiet = (
-        szlib.MPCSettings(terminal="rest"),
+        szlib.MPCSettings(terminal="rest", time_limit=np.inf),
         Worlds(standing=1.0, start_speed=0.0, min_h=0.6),
     )
     for seed in range(10):
         scene = quiet(seed)
-        drive = szlib.DifferentialDrive(
-            ZONE, walls=scene.walls, settings=settings, max_people=len(scene.people)
-        )
+        drive = szlib.DifferentialDrive(ZONE, walls=scene.walls, settings=settings)
         own = Unicycle(np.random.default_rng(seed).uniform(-np.pi, np.pi)).start(
             scene.start
         )
@@ -329,7 +327,10 @@ def test_the_drive_reaches_the_goal_in_the_scenarios_of_the_paper(name):
     """In the loop of szlib. At 8 rad/s: with 4, two passages are too narrow for the point ahead."""
     scenario = szlib.SCENARIOS[name]
     log = szlib.simulate(
-        scenario, szlib.DifferentialDrive(ZONE, walls=scenario.walls, omega_max=8.0)
+        scenario,
+        szlib.DifferentialDrive(
+            ZONE, walls=scenario.walls, settings=AT_LEISURE, omega_max=8.0
+        ),
     )
     numbers = log.metrics()
     assert numbers["success"]
@@ -349,7 +350,7 @@ def test_a_collision_by_a_person_is_flagged_before_it_happens():
         if drive.barriers(own[:2], [now.after(0.1)]).min() < 0:
             assert not step.safe
             return
-    raise AssertionError("nobody ran into the robot: the test is void")
+    raise AssertionError("no person ran into the robot: the test is void")
 
 
 # --- limits and arguments ------------------------------------------------------------------------------
@@ -401,9 +402,8 @@ def test_walls_may_change_between_steps_and_a_copy_continues_identically():
         assert thread.submit(there.step, np.zeros(3), OPEN).result().safe
 
 
-def test_a_goal_too_close_to_a_wall_raises_nothing_while_the_robot_moves():
+def test_a_goal_too_close_to_a_wall_raises_nothing_at_the_first_step():
     drive = szlib.DifferentialDrive(ZONE, walls=[((4.0, -3.0), (4.0, 3.0))])
-    drive.step((0.0, 0.0, 0.0), (2.0, 0.0))
     step = drive.step((0.0, 0.0, 0.0), (3.9, 0.0))
     assert step.point.goal_blocked
     assert step.safe
@@ -426,11 +426,12 @@ def test_limits_that_cannot_be_used_raise_an_error(given, message):
 
 def test_a_state_of_the_wrong_shape_and_a_goal_inside_a_wall_raise_an_error():
     drive = szlib.DifferentialDrive(ZONE, walls=[((4.0, -3.0), (4.0, 3.0))])
-    with pytest.raises(szlib.SolverError, match="state must have shape"):
+    expected = r"\(x, y, theta\) or \(x, y, theta, v, omega\) .*; got 4 numbers"
+    with pytest.raises(szlib.SolverError, match=expected):
         drive.step((0.0, 0.0, 0.0, 0.0), (2.0, 0.0))
     with pytest.raises(szlib.SolverError, match="too close to a wall"):
-        drive.step((0.0, 0.0, 0.0), (3.9, 0.0))
-    drive.step((0.0, 0.0, 0.0), (3.0, 0.0))
+        drive.check_start((0.0, 0.0, 0.0, 0.0), (3.9, 0.0), [])
+    drive.check_start((0.0, 0.0, 0.0, 0.0), (3.0, 0.0), [])
 
 
 def test_the_robot_starts_in_its_direction_of_motion_or_at_the_given_heading():
@@ -448,7 +449,7 @@ def test_by_default_the_robot_turns_as_fast_as_a_common_one():
 @pytest.mark.parametrize("state", [[[1], [1, 2]], "x", None, [0.0] * 4])
 def test_a_state_of_another_shape_is_refused(state):
     with pytest.raises(szlib.SolverError, match="state must"):
-        szlib.DifferentialDrive(ZONE, max_people=0).step(state, (4.0, 0.0))
+        szlib.DifferentialDrive(ZONE).step(state, (4.0, 0.0))
 
 
 # --- routes, and goals close to a wall ---------------------------------------------------------------
@@ -458,7 +459,7 @@ def drive_to(
     goal: tuple[float, float], walls: Any, steps: int, **more: Any
 ) -> list[Any]:
     drive = szlib.DifferentialDrive(
-        ZONE, walls=walls, settings=szlib.MPCSettings(lookahead=4.0)
+        ZONE, walls=walls, settings=szlib.MPCSettings(lookahead=4.0, time_limit=np.inf)
     )
     own, taken = drive.robot.start((-3.0, 0.0, 0.0, 0.0)), []
     for _ in range(steps):
@@ -487,4 +488,70 @@ def test_a_drive_turns_its_back_to_a_wall_behind_the_goal(gap: float) -> None:
     assert min(np.hypot(*step.predicted[0, :2]) for step in steps) < 0.1
     assert all(step.safe for step in steps)
     # the point ahead would be too close to the wall
-    assert abs(steps[-1].heading) > 1.5
+    assert abs(steps[-1].own[2]) > 1.5
+
+
+# --- the step ---------------------------------------------------------------------------------------
+
+
+def test_a_drive_step_is_verified_and_explained():
+    drive = szlib.DifferentialDrive(ZONE, walls=[[(-6, 4), (6, 4)]])
+    step = drive.step(
+        (-4.0, 0.0, 0.1), GOAL, [szlib.Person((0.0, 0.2), (-0.5, 0.0), id="ann")]
+    )
+    assert step.verify().ok and step.verify().safe == step.safe
+    assert step.verify().h == pytest.approx(step.h.min())
+    assert repr(step).startswith("DriveStep(optimal, safe, v=") and "\n" not in repr(
+        step
+    )
+    said = step.explain()
+    assert (
+        said.startswith(repr(step))
+        and "person 0 (id 'ann')" in said
+        and "WRONG" not in said
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (
+            lambda step: {"control": np.add(step.control, (0.01, 0))},
+            "motion of the disc",
+        ),
+        (
+            lambda step: {"own": np.add(step.own, (0, 0, 0.01, 0, 0))},
+            "motion of the disc",
+        ),
+        (lambda step: {"predicted": step.predicted + 1e-4}, "motion of the disc"),
+        (
+            lambda step: {"point": replace(step.point, inputs=step.point.inputs + 0.1)},
+            "motion differs",
+        ),
+    ],
+)
+def test_a_false_claim_of_a_drive_step_is_a_fault(change, fault):
+    step = szlib.DifferentialDrive(ZONE, settings=AT_LEISURE).step(
+        (-4.0, 0.0, 0.1, 0.5, 0.1), GOAL, [FACING]
+    )
+    assert step.verify().ok
+    lie = replace(step, **change(step))
+    assert any(fault in found for found in lie.verify().faults), lie.verify().faults
+    assert "WRONG" in lie.explain()
+
+
+def test_forged_claims_of_the_guard_are_faults_of_a_drive_step():
+    """They are about the disc, and recomputed on its arcs."""
+    s = szlib.MPCSettings(time_limit=np.inf, r_robot=0.3)
+    near = szlib.DifferentialDrive(ZONE, walls=[[(0.6, -5), (0.6, 5)]], settings=s)
+    step = near.step((0.0, 0.0, 0.0, 0.95, 0.0), GOAL)
+    assert not step.walls_safe and step.verify().ok
+    lie = replace(step, point=replace(step.point, walls_safe=True))
+    assert any("cannot" in fault for fault in lie.verify().faults)
+    person = [[1.0, 0.0, -1.2, 0.0]]
+    met = szlib.DifferentialDrive(ZONE, settings=s).step(
+        (0, 0, 0, 0.95, 0), GOAL, person
+    )
+    assert not met.passively_safe and met.verify().ok
+    lie = replace(met, point=replace(met.point, passively_safe=True))
+    assert any("does not" in fault for fault in lie.verify().faults)

@@ -6,10 +6,10 @@ import helpers.ros_stubs as ros
 import numpy as np
 import pytest
 from helpers.ros_stubs import Node, goal, grid, hear, odometry, people
-from szlib.control.verification import euclidean_to_ellipse
 
 import szlib
 from szlib.control.differential_drive import Unicycle
+from szlib.control.verification import euclidean_to_ellipse
 from szlib.zones.polar import DIRECTIONS, PolarZone
 
 ZONE = szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)
@@ -218,11 +218,21 @@ def test_a_robot_that_is_stuck_says_why(make_either):
     )
 
 
-def test_a_goal_inside_a_wall_is_dropped_with_an_error(make_either):
+def test_before_a_goal_inside_a_wall_the_robot_waits_and_says_so(make_either):
     node = make_either(walls="4 -3 4 3")
+    hear(node, "goal_pose", goal(3.95, 0.0))
+    path = drive(node, (0.0, 5.0, 0.0, 0.0), 120)
+    places = np.array([own[:2] for own, _ in path])
+    nearest = np.column_stack([np.full(len(path), 4.0), places[:, 1].clip(-3.0, 3.0)])
+    assert np.hypot(*(places - nearest).T).min() > 0.3, "no wall is touched"
+    assert any("cannot be reached" in said for said in node.logged)
+
+
+def test_a_goal_that_is_not_finite_is_dropped_with_an_error(make_either):
+    node = make_either()
     hear(node, "odom", odometry(np.zeros(5)))
     hear(node, "people", people())
-    hear(node, "goal_pose", goal(3.95, 0.0))
+    hear(node, "goal_pose", goal(np.nan, 0.0))
     assert not tick(node).any()
     assert "the goal is dropped" in node.logged[-1]
     hear(node, "goal_pose", goal(2.0, 0.0))

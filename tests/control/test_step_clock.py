@@ -1,22 +1,19 @@
-"""The clock at the controller: late looks, clocks that differ, rates, latency, deadlines, no progress."""
-
-from itertools import count
+"""The clock at the controller: clocks that differ, rates, latency, and no progress."""
 
 import numpy as np
 import pytest
-from szlib.control.verification import euclidean_to_ellipse
 
 import szlib
-from szlib.control import problem
-from szlib.control.controller import advance
+from szlib.control import controller as base
+from szlib.control.controller import OLDEST_STATE, STUCK_AFTER, advance
 from szlib.control.differential_drive import Unicycle
-from szlib.control.step_clock import OLDEST_STATE, STUCK_AFTER
+from szlib.control.verification import euclidean_to_ellipse
 from szlib.zones.ellipses import BODY_RADIUS
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
-SMALL = szlib.Ellipse((0.0, 0.0), (0.3, 0.3))
 START, GOAL = (-4.0, 0.0, 0.0, 0.0), (4.0, 0.0)
 FACING = szlib.Person((0.0, 0.0), heading=np.pi)
+AT_LEISURE = szlib.MPCSettings(time_limit=np.inf)
 
 
 def positions(seen):
@@ -60,23 +57,13 @@ def test_a_robot_whose_clock_is_off_hits_nobody_while_it_calls_itself_safe():
         state, walker = advance(state, step.control, 0.1), walker - (0.05, 0.0)
 
 
-def test_a_look_that_is_older_than_the_known_one_is_ignored():
-    tracker = szlib.Tracker()
-    tracker.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], stamps=5.0, now=5.0)
-    late = tracker.see([[-0.5, 0.3, 0.0, 1.0]], ids=["a"], stamps=4.8, now=5.1)
-    assert positions(late) == [(0.1, 0.0)] and late[1:] == (0, 0)
-    assert positions(
-        tracker.see([[0.3, 0.0, 1.0, 0.0]], ids=["a"], stamps=5.2, now=5.2)
-    ) == [(0.3, 0.0)]
-
-
 def test_a_clock_that_goes_back_forgets_nobody_and_the_step_says_so():
     controller, seen = szlib.MPCCBF(ZONE), [[0.0, 0.0, 1.0, 0.0], [5.0, 5.0, 0.0, 0.0]]
     controller.step(START, GOAL, seen, ids=["a", "b"], now=9.9)
     controller.step(START, GOAL, np.add(seen, [0.1, 0, 0, 0]), ids=["a", "b"], now=10.0)
     back = controller.step(START, GOAL, seen[1:], ids=["b"], now=8.0)
     assert [person.id for person in back.scene.people] == ["b", "a"], (
-        "who is hidden is remembered"
+        "a hidden person is remembered"
     )
     assert positions(back.scene.tracked)[1] == (0.2, 0.0), "a step further"
     assert back.unknown == 0 and "the clock went back by 2 s" in back.explain()
@@ -86,46 +73,6 @@ def test_a_clock_that_goes_back_forgets_nobody_and_the_step_says_so():
         len(controller.step(START, GOAL, seen[1:], ids=["b"], now=9.2).scene.people)
         == 1
     ), "memory ends"
-
-
-# ids
-
-
-@pytest.mark.parametrize("ids", [[np.nan], [float("nan")], [np.float64("nan")]])
-def test_an_id_that_is_nan_is_no_id(ids):
-    tracker = szlib.Tracker()
-    for k in range(5):
-        assert (
-            len(tracker.see([[0.1 * k, 0.0, 1.0, 0.0]], ids=ids, now=0.1 * k).people)
-            == 1
-        )
-    assert tracker.see(now=0.5).people == ()
-
-
-def test_an_id_that_two_people_have_at_once_is_no_id():
-    tracker, rows = szlib.Tracker(), [[0.0, 0.0, 0.0, 0.0], [4.0, 0.0, 1.0, 0.0]]
-    for k in range(5):
-        seen = tracker.see(rows, ids=["a", "a"], now=0.1 * k)
-        assert (
-            positions(seen) == [(0.0, 0.0), (4.0, 0.0)]
-            and seen.people[0].heading is None
-        )
-    assert tracker.see([[np.nan] * 4, rows[1]], ids=["a", "a"], now=0.6).unknown == 1
-
-
-def test_an_id_reused_metres_away_is_another_person_and_the_first_is_remembered():
-    tracker = szlib.Tracker()
-    tracker.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], now=0.0)
-    seen = tracker.see([[5.0, 3.0, 0.0, 0.0]], ids=["a"], now=0.1)
-    assert positions(seen) == [(5.0, 3.0), (0.1, 0.0)]
-    assert [person.heading for person in seen.people] == [None, 0.0], (
-        "no heading of somebody else"
-    )
-    assert positions(tracker.see([[5.0, 3.0, 0.0, 0.0]], ids=["a"], now=1.5)) == [
-        (5.0, 3.0)
-    ]
-    near = tracker.see([[6.0, 3.0, 0.0, 0.0]], ids=["a"], now=1.6)
-    assert positions(near) == [(6.0, 3.0)], "a metre is noise"
 
 
 # the rate of the loop
@@ -147,17 +94,42 @@ def test_a_loop_at_another_rate_is_noticed_and_one_late_step_is_not():
     )
 
 
-@pytest.mark.parametrize("dt", [0.05, 0.1, 0.4])
-def test_a_gamma_rate_lets_h_fall_equally_fast_whatever_dt_is(dt):
-    settings = szlib.MPCSettings(dt=dt).with_gamma_rate(0.8)
-    assert (1 - settings.gamma) ** (1 / dt) == pytest.approx(np.exp(-0.8))
-    assert (
-        settings.gamma_rate == pytest.approx(0.8)
-        and settings.badges()["gamma"] == "chosen"
+def call_each(monkeypatch, periods, **settings):
+    """The steps of calls without `now`, so many seconds apart by the computer's clock."""
+    controller, time = (
+        szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(**settings)),
+        [50.0],
     )
-    assert szlib.MPCSettings(gamma=1).gamma_rate == np.inf
-    with pytest.raises(szlib.SolverError, match="gamma must be in"):
-        settings.with_gamma_rate(-1)
+    with monkeypatch.context() as patched:
+        patched.setattr(base, "perf_counter", lambda: time[0])
+        steps = []
+        for period in periods:
+            time[0] += period
+            steps.append(controller.step(START, GOAL))
+    return steps
+
+
+@pytest.mark.parametrize("period", [0.05, 0.2])
+def test_calls_at_another_rate_without_a_time_are_reported(monkeypatch, period):
+    """At 20 Hz with dt = 0.1 s h may fall twice as fast as gamma says."""
+    steps = call_each(monkeypatch, [period] * 15)
+    assert f"steps come every {period:g} s, not every dt = 0.1 s" in steps[-1].clock
+    assert "give `now`, or call every dt" in steps[-1].clock
+    assert steps[-1].clock in steps[-1].explain() and steps[4].clock == ""
+
+
+def test_calls_every_dt_or_as_fast_as_a_simulation_are_not_reported(monkeypatch):
+    rng = np.random.default_rng(2)
+    for periods in (
+        [0.1] * 30,
+        [0.001] * 30,
+        rng.uniform(0.085, 0.115, 30),
+        [0.1] * 10 + [0.3] + [0.1] * 20,
+        [2.0] * 30,
+    ):
+        steps = call_each(monkeypatch, periods)
+        assert not any(step.clock for step in steps), periods
+    assert not any(step.clock for step in call_each(monkeypatch, [0.05] * 30, dt=0.05))
 
 
 # the age of the state
@@ -166,7 +138,9 @@ def test_a_gamma_rate_lets_h_fall_equally_fast_whatever_dt_is(dt):
 @pytest.mark.parametrize("latency", [0, 1, 3])
 def test_a_late_state_costs_nothing_if_its_age_is_given(latency):
     """The controller gets states and people that are so many steps old; its controls act at once."""
-    controller = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(gamma=0.6, N_h=8))
+    controller = szlib.MPCCBF(
+        ZONE, settings=szlib.MPCSettings(gamma=0.6, N_h=8, time_limit=np.inf)
+    )
     walker = szlib.Person((1.5, 0.2), (-0.5, 0.0), id="w")
     states, age = [np.array(START)], 0.1 * latency
     for k in range(130):
@@ -193,7 +167,7 @@ def test_a_late_state_costs_nothing_if_its_age_is_given(latency):
 
 def test_a_control_that_takes_effect_late_is_a_state_of_that_age_at_a_later_now():
     """Controls act 0.2 s after they are decided: `now` is that time, and the state is 0.2 s old then."""
-    on_time, delayed = szlib.MPCCBF(ZONE), szlib.MPCCBF(ZONE)
+    on_time, delayed = (szlib.MPCCBF(ZONE, settings=AT_LEISURE) for _ in range(2))
     state, queue = np.array(START), [np.zeros(2)] * 2
     for k in range(100):
         now = 0.1 * k + 0.2
@@ -236,112 +210,6 @@ def test_an_age_that_cannot_be_used_is_refused(age):
         szlib.MPCCBF(ZONE).step(START, GOAL, state_age=age)
 
 
-# deadlines
-
-
-@pytest.mark.parametrize(("deadline", "is_late"), [(np.inf, False), (0.02, True)])
-def test_a_deadline_counts_time_in_which_the_thread_does_not_run(
-    monkeypatch, deadline, is_late
-):
-    ticks = count()
-    monkeypatch.setattr(problem, "perf_counter", lambda: 0.015 * next(ticks))
-    monkeypatch.setattr(problem, "thread_time", lambda: 0.0)
-    controller = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(deadline=deadline))
-    step = controller.step((-1.9, 0, 1, 0), GOAL, [FACING])
-    assert step.timed_out == is_late
-    assert ("time was up after 0.02 s" in step.explain()) == is_late
-    with pytest.raises(szlib.SolverError, match="deadline must be a positive number"):
-        szlib.MPCSettings(deadline=0)
-
-
-def test_ipopt_keeps_the_deadline():
-    settings = szlib.MPCSettings(solver="ipopt", time_limit=np.inf, deadline=1e-7)
-    assert (
-        szlib.MPCCBF(ZONE, settings=settings, max_people=1)
-        .step(START, GOAL, [FACING])
-        .timed_out
-    )
-
-
-# between the samples
-
-
-def fast_meetings(seed, count):
-    """Robots and people who come at up to 8 m/s, at dt = 0.5 s; and the step, with its least true gap."""
-    rng = np.random.default_rng(seed)
-    settings = szlib.MPCSettings(dt=0.5, v_max=3.0, a_max=3.0, N=4, eps=0.0)
-    controller = szlib.MPCCBF(
-        SMALL, settings=settings, walls=[[(-9, 6), (9, 6)]], max_people=1
-    )
-    for _ in range(count):
-        angle, way = rng.uniform(-np.pi, np.pi), rng.uniform(0, 8)
-        velocity = way * np.array([np.cos(angle), np.sin(angle)])
-        middle = rng.uniform(-1.5, 1.5, 2)
-        person = szlib.Person(
-            tuple(middle - rng.uniform(0, 0.5) * velocity), tuple(velocity)
-        )
-        state = np.r_[0.0, rng.uniform(-1, 5.4), rng.uniform(-1.5, 1.5, 2)]
-        controller.reset()
-        step = controller.step(state, (9.0, 0.0), [person])
-        t = np.linspace(0, 0.5, 501)[:, None]
-        path = state[:2] + t * state[2:] + t**2 / 2 * step.control
-        body = (
-            np.hypot(*(path - person.position - t * velocity).T).min()
-            - BODY_RADIUS
-            - 0.5
-        )
-        yield step, min(body, 6 - path[:, 1].max() - 0.5)
-
-
-def test_a_safe_step_covers_the_closest_approach_between_samples():
-    n_safe = n_free = n_tunnelled = 0
-    for step, gap in fast_meetings(seed=3, count=200):
-        report = step.verify()
-        assert report.ok and not (report.safe and gap < -1e-6)
-        assert not step.safe or gap >= 0
-        n_safe += step.safe
-        ends = step.clearance[:, :2].min() >= 0 and step.feasible and step.h.min() >= 0
-        n_free += ends and gap >= 0.2
-        n_tunnelled += ends and gap < 0
-    assert n_tunnelled >= 5, "people who pass through the robot between two samples"
-    assert n_safe >= 0.95 * n_free > 50, "the bound is tight"
-
-
-def test_a_robot_that_slides_along_a_wall_or_touches_it_at_rest_is_safe():
-    wall = [(-20.0, -0.56), (20.0, -0.56)]
-    controller = szlib.MPCCBF(ZONE, walls=[wall])
-    assert controller.step((0.0, 0.0, 1.0, 0.0), (9.0, 0.0)).safe
-    touching = szlib.MPCCBF(
-        ZONE, walls=[[(-20.0, -0.5), (20.0, -0.5)]], settings=szlib.MPCSettings(eps=0.0)
-    )
-    assert touching.step((0.0, 0.00625, 0.0, 0.0), (0.0, 0.00625)).safe
-
-
-# zones that do not hold their person
-
-
-def test_a_zone_that_does_not_contain_its_person_is_refused():
-    for bad in (szlib.Ellipse((50, 0), (1, 0.7)), szlib.Ellipse((0, 0.71), (1, 0.7))):
-        with pytest.raises(szlib.ZoneError, match="must contain its person"):
-            szlib.MPCCBF(bad)
-        with pytest.raises(szlib.ZoneError, match="must contain its person"):
-            szlib.Person((0, 0), zone=bad)
-
-        class Fitted:
-            def ellipse(self, speed, bad=bad):
-                return bad
-
-        with pytest.raises(szlib.ZoneError, match="must contain its person"):
-            szlib.MPCCBF(ZONE).step(
-                START, GOAL, [szlib.Person((0, 0), heading=0.0, zone=Fitted())]
-            )
-    for edge in (
-        szlib.Ellipse((0, 0.7), (1, 0.7)),
-        szlib.Ellipse((0, 0), (0.05, 0.05)),
-    ):
-        assert szlib.MPCCBF(edge).zone == edge
-
-
 # no progress
 
 
@@ -356,7 +224,7 @@ def drive_behind_a_wall(controller, steps, state):
 
 @pytest.mark.parametrize("kind", [szlib.MPCCBF, szlib.DifferentialDrive])
 def test_a_robot_that_makes_no_progress_says_since_when_how_far_and_what_holds_it(kind):
-    controller = kind(ZONE, walls=[[(3, -1), (3, 4)]])
+    controller = kind(ZONE, walls=[[(3, -1), (3, 4)]], settings=AT_LEISURE)
     steps = list(
         drive_behind_a_wall(
             controller, 220, controller.robot.start(np.array([-1.0, 1.0, 0, 0]))
@@ -370,7 +238,7 @@ def test_a_robot_that_makes_no_progress_says_since_when_how_far_and_what_holds_i
     said = steps[-1].explain()
     assert (
         f"no progress for {stuck[-1]:.1f} s" in said
-        and "m from the goal; held by wall 0 (3, -1)-(3, 4)" in said
+        and "m from the goal; held by wall 0 (3, -1, 3, 4)" in said
     )
     assert "no progress" not in steps[20].explain()
     controller.reset()
@@ -378,7 +246,7 @@ def test_a_robot_that_makes_no_progress_says_since_when_how_far_and_what_holds_i
                                     controller.robot.start(np.array([2.0, 1, 0, 0])))).stuck == 0  # fmt: skip
 
 
-def test_who_is_there_approaches_or_has_a_new_goal_is_not_stuck():
+def test_a_robot_that_arrived_approaches_or_has_a_new_goal_is_not_stuck():
     controller = szlib.MPCCBF(ZONE)
     rests = [controller.step((0.05, 0, 0, 0), (0.0, 0.0)).stuck for _ in range(80)]
     assert not any(rests), "it has arrived"
@@ -393,47 +261,3 @@ def test_who_is_there_approaches_or_has_a_new_goal_is_not_stuck():
     assert controller.step((0, 0, 0, 0), (0.0, 3.0), now=1.7e9).stuck == 0, (
         "a clock that jumps is no waiting"
     )
-
-
-# the step of a drive
-
-
-def test_a_drive_step_is_verified_and_explained():
-    drive = szlib.DifferentialDrive(ZONE, walls=[[(-6, 4), (6, 4)]])
-    step = drive.step(
-        (-4.0, 0.0, 0.1), GOAL, [szlib.Person((0.0, 0.2), (-0.5, 0.0), id="ann")]
-    )
-    assert step.verify().ok and step.verify().safe == step.safe
-    assert step.verify().h == pytest.approx(step.h.min())
-    assert repr(step).startswith("DriveStep(warm, safe, v=") and "\n" not in repr(step)
-    said = step.explain()
-    assert (
-        said.startswith(repr(step))
-        and "person 0 (id 'ann')" in said
-        and "WRONG" not in said
-    )
-
-
-@pytest.mark.parametrize(
-    ("change", "fault"),
-    [
-        (
-            lambda step: {"control": np.add(step.control, (0.01, 0.0))},
-            "motion of the disc",
-        ),
-        (lambda step: {"heading": step.heading + 0.01}, "motion of the disc"),
-        (lambda step: {"h": step.h + 1e-4}, "h of the disc"),
-        (lambda step: {"safe": not step.safe}, "safe of the disc"),
-        (
-            lambda step: {"point": szlib.Step(**vars(step.point) | {"slack": 0.1})},
-            "slack",
-        ),
-    ],
-)
-def test_a_false_claim_of_a_drive_step_is_a_fault(change, fault):
-    step = szlib.DifferentialDrive(ZONE).step(
-        (-4.0, 0.0, 0.1, 0.5, 0.1), GOAL, [FACING]
-    )
-    lie = type(step)(**vars(step) | change(step))
-    assert any(fault in found for found in lie.verify().faults), lie.verify().faults
-    assert "WRONG" in lie.explain()

@@ -2,8 +2,8 @@
 
 import numpy as np
 from helpers.speed_model import SpeedModel
-from szlib.control.people import Person
 
+from szlib.control.people import Person
 from szlib.simulation.crowds.reacting import MODELS
 from szlib.simulation.crowds.walking_model import ModelFactory
 from szlib.simulation.scenario import Scenario

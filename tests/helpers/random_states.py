@@ -22,9 +22,7 @@ class Question:
 
     def ask(self, settings: szlib.MPCSettings) -> szlib.Step:
         """The step of a new controller."""
-        controller = szlib.MPCCBF(
-            ZONE, walls=self.walls, settings=settings, max_people=len(self.people)
-        )
+        controller = szlib.MPCCBF(ZONE, walls=self.walls, settings=settings)
         return controller.step(self.state, self.goal, self.people)
 
 
@@ -42,7 +40,7 @@ def questions(seed: int) -> Iterator[Question]:
         )
         state = np.r_[rng.uniform(-3, 3, 2), rng.uniform(-0.6, 0.6, 2)]
         goal = rng.uniform(-6, 6, 2)
-        controller = szlib.MPCCBF(ZONE, walls=walls, max_people=0)
+        controller = szlib.MPCCBF(ZONE, walls=walls)
         h = np.r_[controller.barriers(state[:2], people), controller.barriers(goal)]
         if h.min(initial=np.inf) >= 0:
             yield Question(state, goal, people, walls)

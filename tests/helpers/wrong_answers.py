@@ -599,7 +599,7 @@ SHEET5: dict[str, list[tuple[str, Answer]]] = {
         ("the squared distance", lambda p, a, b: wall(*g_t_length(p, a, b)[:2]) ** 2),
         ("the middle of the wall", lambda p, a, b: np.hypot(*(p - (a + b) / 2).T)),
         (
-            "no answer: this calls szlib.control.barriers",
+            "no answer: this calls szlib.control.obstacles",
             lambda p, a, b: szlib.segment_distance(p, a, b),
         ),
     ],

@@ -80,8 +80,6 @@ def attack_drives(count: int, tally: Counter[str], seed: int = 0) -> None:
         for k in range(count // A_SETTING):
             rng = np.random.default_rng([seed, k, 2])
             s = settings_of(rng)
-            if s.terminal == "person":
-                continue
             turn = min(rng.uniform(0.1, 0.9) * np.pi / s.dt, rng.uniform(1, 8))
             ahead = None if rng.random() < 0.7 else float(rng.uniform(0.05, 0.5))
             walls = [np.array([(-5.0, 8.0), (5.0, 8.0 + rng.uniform())])] * int(

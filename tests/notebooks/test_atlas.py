@@ -38,7 +38,7 @@ def made(
         people=np.tile([0.0, 0.0, np.pi, 0.0, 0.0], (n, 1, 1)),
         predicted=np.zeros((n, 0, 4)),
         residual=np.full((n, 1, 2), 0.0 if held else 1.0),
-        fallback=np.full(n, "warm"),
+        status=np.full(n, "optimal"),
         safe=np.ones(n, bool),
         slack=np.zeros(n),
         solve_time=np.zeros(n),

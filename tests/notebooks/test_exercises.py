@@ -204,7 +204,7 @@ def test_an_answer_that_calls_szlib_or_the_judges_is_refused():
         )
     verdict = check("wall_distance", szlib.segment_distance)
     assert (
-        "no answer: this calls szlib.control.barriers.segment_distance"
+        "no answer: this calls szlib.control.obstacles.segment_distance"
         in verdict.message
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import shapely
 from laboratory import PRESETS, Laboratory, RobotOptions, World, explain, show_sliders
+from laboratory.explanation import name_limit
 from PIL import Image
 
 import szlib
@@ -144,8 +145,7 @@ def test_the_past_can_be_visited_and_goes_on_as_before():
 
 
 REFUSED = {
-    "it lies too close to the wall": {"goal": [1.0, 2.2]},
-    r"too close to the wall.*-6.0, 0\.1": {"walls": [[-6, 0.1, 7, 0.1]]},
+    "goal must be finite": {"goal": [1.0, np.nan]},
     "two different end points": {"goal": [1, 1], "walls": [[0, 0, 0, 0]]},
     "N_h must be at most N": {"robots": [RobotOptions(changes={"N": 4, "N_h": 8})]},
     "the number of robots must be 1 to 2": {"robots": [RobotOptions()] * 3},
@@ -171,10 +171,10 @@ def test_a_limit_is_named_if_and_only_if_the_acceleration_lies_on_its_edge(name)
         step, reasons = advance(world, 5).steps[0], explain(world.steps[0])
         control = shapely.Point(step.control)
         for limit in reasons.active:
-            assert f"{limit.kind} {limit.number} " in reasons.sentence
+            assert f"{name_limit(step, limit)} " in reasons.sentence
             assert shapely.LineString(limit.curve).distance(control) <= 0.02
         at_edge = {
-            (limit.kind, limit.number)
+            limit.row
             for limit in reasons.found.limits
             if shapely.LineString(limit.curve).distance(control) <= 0.02
         }
@@ -199,7 +199,7 @@ def test_the_sentence_says_what_the_robot_does_and_why():
     assert sentence(make_world(n=40)).endswith(
         "and h may shrink by at most 5 % a step."
     )
-    assert "at most 8 % a step" in sentence(make_world(n=40, robots=[AMONG_PEOPLE]))
+    assert "at most 20 % a step" in sentence(make_world(n=40, robots=[AMONG_PEOPLE]))
     assert sentence(make_world("making_room", 20)).startswith("It goes back")
     there = make_world("passing", 95)
     assert sentence(there).startswith(
@@ -212,23 +212,20 @@ def test_danger_and_goals_that_cannot_be_reached_are_said_in_words():
     world = make_world("passing", 25)
     world.change(goal=[0.8, 0.8])
     (note,) = explain(world.steps[0]).notes
-    assert (
-        note
-        == "The goal (0.8, 0.8) cannot be reached: h < 0 there; the robot waits beside it."
-    )
+    assert note.startswith("The goal (0.8, 0.8) cannot be reached, h < 0 there")
     x, y = world.states[0][:2]
     world.change(people={0: {"position": [x + 1.2, y]}})
     reasons = explain(world.steps[0])
     assert reasons.safety == "Not safe: the robot is already too close to person 0."
     world = make_world("circular crossing", 55, [AMONG_PEOPLE])
-    assert "in a crowd it may come nearer to person" in sentence(world)
+    assert "it comes nearer to person" in sentence(world)
     fast = make_world(robots=[FAST])
     while fast.steps[0].feasible:
         fast.advance()
     reasons = explain(fast.steps[0])
     assert ": no plan keeps every limit, so the plan is relaxed" in reasons.sentence
     assert reasons.active == () and reasons.notes[0].startswith(
-        "The plan violates the barrier of person 0"
+        "The plan violates the condition of person 0"
     )
 
 
@@ -260,10 +257,9 @@ def test_every_scene_can_be_shown_and_run(name):
 def test_the_view_stays_when_a_change_is_refused():
     lab = Laboratory(zone=ZONE)
     before = ask(lab, "step")
-    refused = ask(lab, "show", 1, walls=[[-6, 2.3, 50, 2.3], [-6, 0, 7, 0]])
-    assert refused.pop("kind") == "error" and "too close to the wall" in refused.pop(
-        "text"
-    )
+    refused = ask(lab, "show", 1, walls=[[-6, 2.3, 50, 2.3], [0, 0, 0, 0]])
+    assert refused.pop("kind") == "error"
+    assert "two different end points" in refused.pop("text")
     assert refused == {
         key: value for key, value in before.items() if key not in ("kind", "text")
     }

@@ -1,5 +1,6 @@
 """The closed loop takes any controller, any robot, and people who come and go."""
 
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -58,7 +59,7 @@ def test_a_foreign_controller_drives_and_missing_reports_are_empty(tmp_path):
     metrics = log.metrics()
     assert log.success and metrics["outcome"] == "arrived"
     assert log.predicted.shape[1] == log.residual.shape[2] == 0
-    assert set(log.fallback) == {""} and np.isnan(log.slack).all()
+    assert set(log.status) == {""} and np.isnan(log.slack).all()
     assert (log.solve_time > 0).all()
     log.save(tmp_path / "run")
     back = szlib.SimulationLog.load(tmp_path / "run")
@@ -211,7 +212,7 @@ def test_the_controller_gets_present_people_with_their_zones():
 
 
 def test_residuals_belong_to_people_who_are_present():
-    log = szlib.simulate(WALK, szlib.MPCCBF(ZONE, max_people=2), crowd=visitor)
+    log = szlib.simulate(WALK, szlib.MPCCBF(ZONE), crowd=visitor)
     there = (log.time >= 2) & (log.time < 4)
     assert np.array_equal(~np.isnan(log.residual[:, 0, 0]), there)
     assert (
@@ -259,7 +260,7 @@ def test_people_without_a_heading_get_a_circle_or_keep_their_last_heading():
         )
         return [still, walked]
 
-    log = szlib.simulate(WALK, szlib.MPCCBF(ZONE, max_people=2), crowd=crowd)
+    log = szlib.simulate(WALK, szlib.MPCCBF(ZONE), crowd=crowd)
     assert log.zones == (circle_around(ZONE), ZONE)
     assert np.isfinite(log.h).all() and (log.people[:, :, 2] == 0).all()
     barriers = szlib.MPCCBF(ZONE).barriers(
@@ -329,6 +330,25 @@ class Broken(Straight):
 def test_invalid_controllers_and_crowds_are_rejected(controller, crowd, message):
     with pytest.raises(szlib.SolverError, match=message):
         szlib.simulate(WALK, controller, crowd=crowd, max_time=2.0)
+
+
+EDGE = szlib.control.HalfPlane(point=(0.0, -1.0), normal=(0.0, 1.0))
+
+
+@pytest.mark.parametrize("of_controller", [(), (EDGE,)])
+@pytest.mark.parametrize("kind", [szlib.MPCCBF, szlib.DifferentialDrive])
+def test_a_controller_with_other_obstacles_is_rejected(kind, of_controller):
+    of_scenario = () if of_controller else (EDGE,)
+    platform = replace(WALK, obstacles=of_scenario)
+    with pytest.raises(szlib.SolverError, match="knows other obstacles than 'walk'"):
+        szlib.simulate(platform, kind(ZONE, obstacles=of_controller))
+
+
+def test_the_same_obstacles_are_accepted_whatever_object_they_are():
+    again = szlib.control.HalfPlane(point=(0.0, -1.0), normal=(0.0, 1.0))
+    controller = szlib.MPCCBF(ZONE, obstacles=[again])
+    log = szlib.simulate(replace(WALK, obstacles=(EDGE,)), controller)
+    assert log.success and log.h.min() >= 0
 
 
 def test_settings_with_another_dt_are_rejected():

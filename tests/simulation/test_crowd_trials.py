@@ -11,9 +11,9 @@ import pytest
 from helpers.crowd_models import scene
 from helpers.track_tables import make_tracks, make_walk
 from studies.crowd_trials import CROWDED, measure, violated_by_who_kept
-from szlib.control.people import Person
 
 import szlib
+from szlib.control.people import Person
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.crowds.reacting import ReactingPeople
 from szlib.simulation.crowds.walking_model import ModelFactory

@@ -14,9 +14,9 @@ import pandas as pd
 import pytest
 from helpers.crowd_models import PACKAGES, scene
 from helpers.track_tables import make_tracks, make_walk
-from szlib.control.people import Person
 
 import szlib
+from szlib.control.people import Person
 from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
 from szlib.simulation.crowds.social_force import SocialForceModel
 from szlib.simulation.crowds.walking_model import ModelFactory, Walkers

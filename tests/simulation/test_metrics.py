@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.control import STATUSES
 from szlib.simulation.metrics import (
     compute_metrics,
     find_avoidance_start,
@@ -37,7 +38,7 @@ def make_run(
         "made", states[0], goal, tuple(szlib.Person((9, 9)) for _ in people), walls
     )
     given = {
-        "fallback": np.full(n, "warm"),
+        "status": np.full(n, "optimal"),
         "safe": np.ones(n, bool),
         "slack": np.zeros(n),
     }
@@ -131,16 +132,15 @@ def test_steps_are_counted_if_their_control_is_applied() -> None:
     """The person is in the way: h < 0 within 1.25 m of them, an overlap within 0.75 m."""
     states = with_speeds([2.0] * 11)  # x = 0, 0.2, ..., 2.0
     n, person = len(states), (2.0, 0.0)
-    fallback = np.array(
-        ["cold"] * 2 + ["kept"] + ["relaxed"] * 3 + ["braking"] * 4 + ["cold"]
-    )
+    statuses = {"optimal": 2, "restarted": 1, "relaxed": 3, "braking": 4}
+    status = np.array([*np.repeat(list(statuses), list(statuses.values())), "optimal"])
     safe = np.arange(n) != 7
     slack = np.array([0.0, 2e-6, *[0.1] * 8, 5.0])
     found = compute_metrics(
         make_run(
             states,
             person,
-            fallback=fallback,
+            status=status,
             safe=safe,
             slack=slack,
             solve_time=np.arange(n) / 10,
@@ -150,11 +150,7 @@ def test_steps_are_counted_if_their_control_is_applied() -> None:
     assert (found["claimed_safe_steps"], found["flagged_steps"]) == (9, 1)
     assert (found["unflagged_violations"], found["unflagged_overlaps"]) == (6, 3)
     assert (found["infeasible_steps"], found["max_slack"]) == (9, 0.1)
-    counts = [
-        found[f"steps_{name}"]
-        for name in ("warm", "cold", "kept", "relaxed", "braking")
-    ]
-    assert counts == [0, 2, 1, 3, 4]
+    assert {name: found[f"steps_{name}"] for name in STATUSES} == statuses
     assert found["solve_time_median"] == pytest.approx(0.5)
     assert found["solve_time_p95"] == pytest.approx(0.95)
     assert found["solve_time_p99"] == pytest.approx(0.99)

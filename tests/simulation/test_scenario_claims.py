@@ -35,7 +35,7 @@ def make_run(
         people=people,
         predicted=np.zeros((n, 0, 4)),
         residual=np.full((n, people.shape[1] + len(scenario.walls), 2), residual),
-        fallback=np.full(n, "warm"),
+        status=np.full(n, "optimal"),
         safe=np.ones(n, bool),
         slack=np.zeros(n),
         solve_time=np.zeros(n),

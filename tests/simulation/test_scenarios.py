@@ -17,8 +17,8 @@ ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 KEYS = {
     "success", "time_to_goal", "path_length", "min_h", "min_clearance", "min_speed", "mean_speed",
     "max_speed", "time_stopped", "time_yielding", "passing_side", "infeasible_steps",
-    "solve_time_median", "solve_time_p95", "solve_time_max", "steps_warm", "steps_cold", "steps_kept",
-    "steps_relaxed", "steps_braking", "outcome",
+    "solve_time_median", "solve_time_p95", "solve_time_max", "outcome",
+    "steps_optimal", "steps_relaxed", "steps_restarted", "steps_braking",
     "min_h_people", "min_h_walls", "jerk", "people", "walls", "flagged_steps", "unflagged_violations",
     "unflagged_overlaps", "min_clearance_people", "min_clearance_walls",
     "max_slack", "solve_time_p99", "violations", "overlaps", "claimed_safe_steps",
@@ -230,7 +230,7 @@ def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
         "residual": np.zeros((4, 1, 2)),
         "controls": np.zeros((4, 2)),
     }
-    steps = {"fallback": np.full(4, "warm"), "safe": np.ones(4, bool)}
+    steps = {"status": np.full(4, "optimal"), "safe": np.ones(4, bool)}
     times = {
         "slack": np.zeros(4),
         "solve_time": np.zeros(4),
@@ -318,6 +318,22 @@ def test_scenarios_are_read_only():
 # --- the log -----------------------------------------------------------------------------------------
 
 
+def test_a_log_with_an_obstacle_of_an_unknown_kind_is_rejected(tmp_path):
+    edge = szlib.control.HalfPlane((0.0, -2.0), (0.0, 1.0))
+    log = szlib.simulate(
+        replace(szlib.SCENARIOS["passing"], obstacles=(edge,)),
+        szlib.MPCCBF(ZONE, obstacles=[edge]),
+        max_time=0.2,
+    )
+    log.save(tmp_path / "run")
+    (back,) = szlib.SimulationLog.load(tmp_path / "run").scenario.obstacles
+    assert (type(back), back.numbers) == (type(edge), edge.numbers)
+    file = tmp_path / "run.json"
+    file.write_text(file.read_text().replace('"half-plane"', '"sofa"'))
+    with pytest.raises(szlib.DataError, match="no class of obstacles has the kind"):
+        szlib.SimulationLog.load(tmp_path / "run")
+
+
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
 def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
     log = logs[name]
@@ -383,7 +399,7 @@ def test_the_repr_of_a_log_is_short(logs):
     assert (
         "'corridor'" in shown
         and "outcome arrived" in shown
-        and "1 people, 2 walls" in shown
+        and "1 people, 2 obstacles" in shown
     )
     html = logs["corridor"]._repr_html_()
     assert "time_to_goal" in html and "Avoiding a person" in html

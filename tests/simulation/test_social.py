@@ -25,7 +25,7 @@ def made(states, people=(), walls=(), arrival=None, goal=(10.0, 0.0)):
         "residual": np.zeros((n, len(known) + len(walls), 0)),
     }
     steps = {
-        "fallback": np.full(n, ""),
+        "status": np.full(n, ""),
         "safe": np.zeros(n, bool),
         "slack": np.full(n, np.nan),
     }

@@ -19,9 +19,9 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).parents[2]
 TABLES = ROOT / "notebooks" / "tables"
 BARRIER = (
-    "control/barriers.py",
-    "return h_next - (1 - gamma) * h",
-    "return h_next - (1 - 2 * gamma) * h",
+    "control/problem.py",
+    "tuple((1 - s.gamma) ** m",
+    "tuple((1 - 2 * s.gamma) ** m",
 )
 HULL = (
     "zones/hulls.py",

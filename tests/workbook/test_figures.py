@@ -45,6 +45,70 @@ def step():
     )
 
 
+EDGE = szlib.control.HalfPlane(point=(0.0, -2.0), normal=(0.1, 1.0))
+
+
+@pytest.fixture(scope="module")
+def platform():
+    person = szlib.Person((2.0, 0.3), (-0.5, 0.0))
+    walls = [((-5.0, 3.0), (5.0, 3.0))]
+    scenario = szlib.Scenario(
+        "platform", (-4, 0, 0, 0), (4, 0), (person,), walls, obstacles=(EDGE,)
+    )
+    controller = szlib.MPCCBF(ZONE, walls=walls, obstacles=[EDGE])
+    return szlib.simulate(scenario, controller, max_time=4.0), controller
+
+
+def along_edge(ax):
+    """The ends of the line of the half-plane in `ax`, and whether its other side is hatched."""
+    (line,) = (each for each in ax.lines if each.get_label() == "half-plane")
+    (inside,) = (each for each in ax.collections if getattr(each, "hatches", None))
+    (hatched,) = (path for path in inside.get_paths() if len(path))
+    return line.get_xydata(), hatched
+
+
+@pytest.mark.parametrize("name", ["scenario", "robot paths", "crowd", "step"])
+def test_a_half_plane_is_a_line_across_the_picture_and_hatched_beyond(platform, name):
+    log, controller = platform
+    step = controller.step(*log.controller_inputs(3.5))
+    ax = {
+        "scenario": lambda: figures.plot_scenario(log),
+        "robot paths": lambda: figures.plot_robot_paths({"a": log}),
+        "crowd": lambda: figures.plot_crowd(log),
+        "step": lambda: figures.plot_step(step),
+    }[name]()
+    assert in_metres(ax)
+    ends, hatched = along_edge(ax)
+    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+    assert EDGE.distance(*ends.T, 0.0, *EDGE.numbers) == pytest.approx(0.0, abs=1e-3)
+    at_border = np.isclose(ends, [x0, y0]) | np.isclose(ends, [x1, y1])
+    assert len(ends) == 2 and at_border.any(axis=1).all()
+    beyond = EDGE.distance(*hatched.vertices.T, 0.0, *EDGE.numbers)
+    assert beyond.max() <= 1e-3 and beyond.min() < -0.1
+
+
+def test_the_player_draws_a_half_plane_as_one_line(platform):
+    log, _ = platform
+    wall, edge = figures.animate(log, width=3.0).run["layout"]["walls"]
+    assert wall == [-5.0, 3.0, 5.0, 3.0]
+    x, y = np.reshape(edge, (2, 2)).T
+    assert EDGE.distance(x, y, 0.0, *EDGE.numbers) == pytest.approx(0.0, abs=2e-3)
+
+
+def test_barriers_of_people_who_come_later_are_theirs_and_not_of_a_wall():
+    scenario = szlib.Scenario("hall", (-4, 0, 0, 0), (4, 0))
+    person = szlib.Person((0.0, 3.0), heading=0.0)
+    log = szlib.simulate(
+        scenario,
+        szlib.MPCCBF(ZONE),
+        crowd=lambda t, _: [person if t > 1 else None],
+        max_time=2.0,
+    )
+    ax = figures.plot_barriers(log)
+    assert [line.get_label() for line in ax.lines[:-1]] == ["person"]
+    assert ax.get_ylim()[1] > np.nanmax(log.h)
+
+
 @pytest.fixture(scope="module")
 def samples():
     rng = np.random.default_rng(0)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from szlib.control.barriers import barrier, cbf_residual, ellipse_distance, segment_distance
-from szlib.control.distances import euclidean_to_segment, required_margin
+from szlib.control.obstacles import barrier, cbf_residual, ellipse_distance, segment_distance
+from szlib.control.verification import euclidean_to_segment, required_margin
 from szlib.zones.ellipses import Ellipse
 
 from .task import Args, Rng, make_task, repeat

@@ -40,7 +40,7 @@ def _draw_zone(rng: Rng, b: float = 0.7) -> Ellipse:
 def _run(name: str, zone: Ellipse, settings: MPCSettings, turned: bool = False) -> dict[str, float]:
     """Metrics of a scenario of the paper, with the distance where avoidance starts, `start` [m]."""
     scenario = SCENARIOS[name].turn_people() if turned else SCENARIOS[name]
-    log = simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=1))
+    log = simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings))
     return log.metrics() | {"start": find_avoidance_start(log)[0]}
 
 

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ...checks import Array, check_array, require
-from ...control.person import Person
+from ...control.people import Person
 from ...control.settings import MPCSettings
 from ...errors import SolverError
 from ...zones.ellipses import BODY_RADIUS

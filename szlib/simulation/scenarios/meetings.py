@@ -22,7 +22,7 @@ import numpy as np
 import shapely
 
 from ...checks import Array
-from ...control.person import Person
+from ...control.people import Person
 from ...zones.ellipses import Ellipse
 from ..scenario import UNAFFECTED, Crowd, Scenario
 

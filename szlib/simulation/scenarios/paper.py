@@ -4,7 +4,7 @@ The paper gives no coordinates.  They are assumed: a person stands, or walks at 
 way of a robot that starts at rest.  World frame, metres and seconds.
 
 The side on which the robot passes is not among the claims: nothing in the paper's formulation prefers one
-(see `szlib.control.head_on`).
+(see `szlib.control.routes`).
 
 >>> import szlib
 >>> list(szlib.SCENARIOS)
@@ -18,20 +18,18 @@ from math import pi
 import numpy as np
 
 from ...control.mpc import MPCCBF
-from ...control.person import Person
+from ...control.people import Person
 from ..closed_loop import simulate
 from ..metrics import compute_metrics, find_avoidance_start, locate_along_course
 from ..run import Run
 from ..scenario import GOAL_RADIUS, Claim, Scenario
 from ..strategies import MIN_RETREAT, MIN_WAIT
 
-EARLY_H = (
-    0.5  # avoidance that starts above this h starts well before the zone [m] (assumed)
-)
+# avoidance that starts above this h starts well before the zone [m] (assumed)
+EARLY_H = 0.5
 PASSING_DISTANCE = 1.0  # the robot passes a person who is within this distance ahead or behind [m] (assumed)
-SLOW_FRACTION = (
-    0.8  # below this fraction of its greatest speed the robot has slowed down (assumed)
-)
+# below this fraction of its greatest speed the robot has slowed down (assumed)
+SLOW_FRACTION = 0.8
 MOUTH = 0.0  # x of the near end of the restricted pathway [m]
 
 _CORRIDOR = np.array([[(-6.0, y), (7.0, y)] for y in (2.3, -2.3)])

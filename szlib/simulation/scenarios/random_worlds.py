@@ -5,16 +5,16 @@ World frame, metres and seconds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, dist, pi, sin
 
 import numpy as np
 
 from ...checks import Array, require
-from ...control.barriers import compute_h, euclidean_segment_formula
-from ...control.distances import required_margin
-from ...control.person import Person, PlacedZone, place_zone
+from ...control.obstacles import Obstacles, Wall, Zone, euclidean_segment_formula
+from ...control.people import Person
 from ...control.settings import MPCSettings
+from ...control.verification import required_margin
 from ...errors import SolverError
 from ...zones.ellipses import BODY_RADIUS, Ellipse
 from ..scenario import Scenario
@@ -106,9 +106,8 @@ class Worlds:
         """
         rng = np.random.default_rng(seed)
         for _ in range(_TRIES):
-            drawn = draw_zone(
-                rng
-            )  # in any case: the rest of the world does not depend on it
+            # in any case: the rest of the world does not depend on it
+            drawn = draw_zone(rng)
             zone, walls = self.zone or drawn, _draw_walls(rng, self)
             people = _draw_people(rng, self, walls, zone)
             x, goal = rng.uniform(-self.size / 2, self.size / 2, (2, 2))
@@ -119,7 +118,7 @@ class Worlds:
             eps = max(
                 [_ROBOT.eps, *(required_margin(wall, _ROBOT.r_robot) for wall in walls)]
             )
-            placed = [place_zone(person, zone) for person in people]
+            placed = [_place(person, zone) for person in people]
             standing = [
                 each
                 for each, person in zip(placed, people, strict=True)
@@ -192,15 +191,15 @@ def _draw_people(
     return people
 
 
-def _min_h(point: Array, zones: list[PlacedZone], walls: Array, eps: float) -> float:
-    """Smallest h of the people and walls at a point [m]."""
-    (x, y), rows = (
-        point.tolist(),
-        [(*ends, eps) for ends in walls.reshape(-1, 4).tolist()],
+def _place(person: Person, zone: Ellipse) -> Zone:
+    """The zone of a person in the world."""
+    return Zone(
+        *Zone.place(zone, person.position, person.heading or 0.0, person.velocity)
     )
-    return float(
-        min(
-            compute_h(x, y, zones, rows, r_robot=_ROBOT.r_robot, eps=eps),
-            default=np.inf,
-        )
-    )
+
+
+def _min_h(point: Array, zones: list[Zone], walls: Array, eps: float) -> float:
+    """Smallest h of the people and walls at a point, with the margin `eps` around all [m]."""
+    items = [*zones, *(Wall(*ends) for ends in walls.reshape(-1, 4).tolist())]
+    with_eps = replace(_ROBOT, eps=eps, margin="paper")
+    return float(Obstacles.of(items, with_eps).h(*point).min(initial=np.inf))

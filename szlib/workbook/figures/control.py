@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import contourpy
 import matplotlib.pyplot as plt
 import numpy as np
 import shapely
@@ -14,20 +16,29 @@ from numpy.typing import ArrayLike
 from shapely.plotting import patch_from_polygon
 
 from ...checks import Array
-from ...control.acceleration_polygon import BarrierLimit, find_admissible_controls
-from ...control.barriers import barrier, check_wall, ellipse_distance, segment_distance
-from ...control.distances import (
+from ...control.obstacles import (
+    Obstacle,
+    Wall,
+    barrier,
+    check_wall,
+    ellipse_distance,
+    segment_distance,
+)
+from ...control.step import BarrierLimit, Step, find_admissible_controls
+from ...control.verification import (
     compute_distance_error,
     find_safe_boundary,
     required_margin,
 )
-from ...control.step import Step
 from ...zones.ellipses import Ellipse
 from .palette import BLACK, BLUE, GREEN, GREY, RED
 from .style import add_legend_below, draw_person, get_axes, label_metres
 
-# Line styles of walls 0, 1, 2, 3; then again from the first.
-_WALL_LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
+# Line styles of obstacles that stand still; after the last again from the first.
+_LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
+# Points on each side of the grid on which the outline of an obstacle is found.
+_GRID = 201
+_CHORD_ERROR = 1e-3  # distance of a corner of this outline that may be left out [m]
 
 
 def plot_distance(
@@ -113,9 +124,8 @@ def plot_distance_error(
     x, y = np.moveaxis(grid, -1, 0)
     error = compute_distance_error(grid, shape)
     true = _distance(grid, shape) - error
-    shown = np.ma.masked_where(
-        (true < 0) | (true > 0.9), 100 * error
-    )  # no error matters farther away
+    # no error matters farther away
+    shown = np.ma.masked_where((true < 0) | (true > 0.9), 100 * error)
     image = ax.pcolormesh(
         x, y, shown, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True
     )
@@ -161,7 +171,7 @@ def _outline(shape: Ellipse | ArrayLike) -> Array:
 def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
     """Plot all first accelerations that obey every constraint of a step, and the chosen one.
 
-    The rest of the plan stays as it is. Each line is the limit from one person or wall, hatched where it
+    The rest of the plan stays as it is. Each line is the limit from one obstacle, hatched where it
     forbids; of several limits the one that forbids most is drawn.
 
     Parameters
@@ -191,9 +201,11 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
     )
     ax.add_patch(bounds).set_label("bound of the acceleration")
     for limit, forbidden in _strictest_limits(found.limits, reach):
-        wall_line = _WALL_LINES[limit.number % len(_WALL_LINES)]
-        colour, line = (RED, "-") if limit.kind == "person" else (BLACK, wall_line)
-        name = f"{limit.kind} {limit.number}, step {limit.k} to {limit.k + 1}"
+        number = limit.row - len(step.scene.people)
+        colour, line = (
+            (RED, "-") if number < 0 else (BLACK, _LINES[number % len(_LINES)])
+        )
+        name = f"{step.scene.name(limit.row).partition(' (')[0]}, step {limit.k} to {limit.k + 1}"
         ax.plot(*limit.curve.T, linestyle=line, color=colour, linewidth=1.8, label=name)
         if not forbidden.is_empty:
             style = {
@@ -237,16 +249,16 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
 def _strictest_limits(
     limits: tuple[BarrierLimit, ...], reach: float
 ) -> list[tuple[BarrierLimit, Any]]:
-    """The limit of each person and wall that forbids most of the figure, and the part that it forbids."""
+    """The limit of each obstacle that forbids most of the figure, and the part that it forbids."""
     box = shapely.box(-reach, -reach, reach, reach)
-    strictest: dict[tuple[str, int], tuple[BarrierLimit, Any]] = {}
+    strictest: dict[int, tuple[BarrierLimit, Any]] = {}
     for limit in limits:
         (x0, y0), (x1, y1) = limit.curve[0], limit.curve[-1]
         right = np.array([y1 - y0, x0 - x1]) / np.hypot(x1 - x0, y1 - y0)
         side = shapely.Polygon(
             np.vstack([limit.curve, limit.curve[::-1] + 4 * reach * right])
         )
-        forbidden, source = side.intersection(box), (limit.kind, limit.number)
+        forbidden, source = side.intersection(box), limit.row
         if source not in strictest or forbidden.area > strictest[source][1].area:
             strictest[source] = limit, forbidden
     return list(strictest.values())
@@ -271,7 +283,7 @@ def draw_step(step: Step) -> Figure:
 
 
 def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
-    """Plot the scene of a step and its plan: the robot, zones, walls near by, velocities.
+    """Plot the scene of a step and its plan: the robot, zones, what stands still near by, velocities.
 
     Parameters
     ----------
@@ -315,35 +327,77 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
         ax.plot(*curves[-1].T, color=RED, linewidth=1.8, label="zone")
         draw_person(ax, px, py, heading, color=RED, markersize=7)
         ax.quiver(px, py, *person.velocity, color=RED, **arrow)
-    for j, (xa, ya, xb, yb, _) in enumerate(scene.walls):
-        ax.plot(
-            (xa, xb),
-            (ya, yb),
-            color=BLACK,
-            linewidth=3,
-            solid_capstyle="round",
-            label="wall",
-        )
-        wall = shapely.LineString([(xa, ya), (xb, yb)])
-        beside = np.clip(
-            wall.project(shapely.Point(x, y)), 0.6, max(0.6, wall.length - 0.6)
-        )
-        near = wall.interpolate(beside)
-        ax.text(near.x, near.y, f" wall {j}", fontsize=8, va="bottom", clip_on=True)
     drawn = np.vstack(curves)
     (x0, y0), half = (
         (drawn.min(axis=0) + drawn.max(axis=0)) / 2,
         np.ptp(drawn, axis=0).max() / 2 + 0.2,
     )
+    ax.set(xlim=(x0 - half, x0 + half), ylim=(y0 - half, y0 + half))
+    for i, obstacle in enumerate(scene.fixed.items, start=len(scene.people)):
+        name = scene.name(i).partition(" (")[0]
+        for line in draw_obstacle(ax, obstacle):
+            path = shapely.LineString(line)
+            beside = np.clip(
+                path.project(shapely.Point(x, y)), 0.6, max(0.6, path.length - 0.6)
+            )
+            near = path.interpolate(beside)
+            ax.text(near.x, near.y, f" {name}", fontsize=8, va="bottom", clip_on=True)
     ax.plot(
         *zip((x, y), step.target, strict=True),
         ":",
         color=BLUE,
         label="direction to the target",
     )
-    ax.set(xlim=(x0 - half, x0 + half), ylim=(y0 - half, y0 + half))
     add_legend_below(ax, gap=0.16, ncols=3)
     return label_metres(
         ax,
         f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s",
     )
+
+
+def draw_obstacle(ax: Axes, obstacle: Obstacle) -> list[Array]:
+    """Draw the outline of an `obstacle` within the limits of `ax`, hatched inside, and return its lines."""
+    limits = (*ax.get_xlim(), *ax.get_ylim())
+    lines = outline_obstacle(obstacle, limits)
+    for line in lines:
+        ax.plot(
+            *line.T,
+            color=BLACK,
+            linewidth=3,
+            solid_capstyle="round",
+            label=obstacle.kind,
+        )
+    if not isinstance(obstacle, Wall):
+        x, y, gap = _measure_gap(obstacle, limits)
+        inside = ax.contourf(
+            x, y, gap, levels=[-np.inf, 0.0], colors="none", hatches=["///"]
+        )
+        inside.set(edgecolor=GREY, linewidth=0.0)
+    return lines
+
+
+def outline_obstacle(obstacle: Obstacle, limits: Sequence[float]) -> list[Array]:
+    """The lines where the gap to an `obstacle` is 0, shape (n, 2) each.
+
+    Parameters
+    ----------
+    obstacle : any kind; a wall is its segment.
+    limits : x0, x1, y0, y1 of what is shown [m]; only lines within it are found, except of walls.
+    """
+    if isinstance(obstacle, Wall):
+        return [np.reshape(obstacle.numbers, (2, 2))]
+    generator = contourpy.contour_generator(
+        *_measure_gap(obstacle, limits), line_type=contourpy.LineType.Separate
+    )
+    lines: Any = generator.lines(0.0)
+    straight = [shapely.LineString(line).simplify(_CHORD_ERROR) for line in lines]
+    return [np.array(line.coords) for line in straight]
+
+
+def _measure_gap(
+    obstacle: Obstacle, limits: Sequence[float]
+) -> tuple[Array, Array, Array]:
+    """A grid of points within the `limits`, and the gap to an `obstacle` at each, shape (n, n) [m]."""
+    x0, x1, y0, y1 = limits
+    x, y = np.meshgrid(np.linspace(x0, x1, _GRID), np.linspace(y0, y1, _GRID))
+    return x, y, obstacle.gap(x, y, 0.0, *obstacle.numbers)

@@ -7,6 +7,7 @@ from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from hashlib import sha256
 from html import escape
+from itertools import pairwise
 from math import isnan
 from pathlib import Path
 from string import Template
@@ -19,6 +20,7 @@ from ...control.settings import MPCSettings
 from ...simulation.run import Run
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
+from .control import outline_obstacle
 from .palette import BLUE, GREEN, RED
 
 _STATIC = Path(__file__).parents[1] / "static"  # what a browser shows
@@ -31,12 +33,17 @@ def scene_layout(
 
     Parameters
     ----------
-    scenario : its walls and its goal are drawn.
+    scenario : its goal, its walls and other obstacles are drawn.
     settings : its radius of the robot and its time step are used.
     limits : x0, x1, y0, y1 of the scene [m].
     """
     return {
-        "walls": scenario.walls.reshape(-1, 4).tolist(),
+        "walls": [
+            [*start, *end]
+            for obstacle in scenario.fixed
+            for line in outline_obstacle(obstacle, limits)
+            for start, end in pairwise(line.round(3).tolist())
+        ],
         "goal": scenario.goal.tolist(),
         "limits": [round(float(limit), 2) for limit in limits],
         "radius": settings.r_robot,
@@ -52,7 +59,7 @@ def snapshot(
     zones: Iterable[Ellipse],
     plan: Array,
     h: Array,
-    fallback: str,
+    status: str,
 ) -> dict[str, Any]:
     """One time of a run, for `static/scene.js`.
 
@@ -63,8 +70,8 @@ def snapshot(
     people : (x, y, heading, ...) of each person, shape (P, 3 or more) [m, rad]; NaN for an absent person.
     zones : zone of each person, in the person's frame.
     plan : states of the plan, shape (N+1, 4) or (0, 4).
-    h : barrier of each person and wall [m].
-    fallback : `Step.fallback`, or "".
+    h : barrier of each obstacle [m].
+    status : `Step.status`, or "".
     """
     present, known = ~np.isnan(people[:, 0]), h[np.isfinite(h)]
     placed = place_zones(zones, people)
@@ -78,7 +85,7 @@ def snapshot(
         ],
         "plan": plan[np.isfinite(plan[:, 0]), :2].round(3).tolist(),
         "h": round(float(known.min()), 3) if known.size else None,
-        "fallback": fallback,
+        "status": status,
     }
 
 
@@ -123,14 +130,14 @@ class Movie(bytes):
         """
         movie = super().__new__(cls, gif)
         columns = run.time.tolist(), run.states, run.people, run.predicted, run.h
-        steps = run.fallback.tolist(), run.stuck.tolist()
+        steps = run.status.tolist(), run.stuck.tolist()
         n = len(run.zones)
         movie.run = {
             "layout": scene_layout(run.scenario, run.settings, limits),
             "snapshots": [
-                snapshot(t, state, people, run.zones, plan, h, fallback)
+                snapshot(t, state, people, run.zones, plan, h, status)
                 | {"stuck": stuck}
-                for t, state, people, plan, h, fallback, stuck in zip(
+                for t, state, people, plan, h, status, stuck in zip(
                     *columns, *steps, strict=True
                 )
             ],

@@ -23,6 +23,7 @@ from ...simulation.replay import Replay
 from ...simulation.run import Run, nanmin
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
+from .control import draw_obstacle
 from .movies import Movie, place_zones
 from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from .style import add_legend_below, draw_person, get_axes, label_metres
@@ -31,9 +32,8 @@ _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 _ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 _PADDING = 0.2  # margin around everything that is drawn [m]
 _SAME_PLACE = 0.35  # positions nearer than this share one time label [m]
-_WALL_EXTENT = (
-    3.0  # a wall is drawn to its end if the end is at most this far from all else [m]
-)
+# a wall is drawn to its end if the end is at most this far from all else [m]
+_WALL_EXTENT = 3.0
 _CROWD_MARGIN = 3.0  # margin around the robot's path in a crowd [m]
 
 
@@ -60,6 +60,7 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
     ax = get_axes(ax, size=(9, 4.5))
     step = max(1, round(every / run.settings.dt))
     shown = np.arange(0, len(run.states), step)
+    _set_limits(ax, [(run, shown)])
     _draw_scenery(ax, run.scenario)
     ax.plot(
         *run.states[:, :2].T,
@@ -76,13 +77,13 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
         )
     _write_times(ax, run.time[shown], run.states[shown, :2], colour=BLACK, above=0)
     for i in range(len(run.zones)):
+        # dark red
         _write_times(
             ax, run.time[shown], run.people[shown, i, :2], colour="#7A2E00", above=8
-        )  # dark red
+        )
     ax.plot([], [], "o", color=BLUE, label="robot")
     ax.plot([], [], color=RED, label="zone")
     ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
-    _set_limits(ax, [(run, shown)])
     add_legend_below(ax, gap=0.14, ncols=6)
     return label_metres(ax, f"{run.scenario.title} (times in s; later is darker)")
 
@@ -123,7 +124,7 @@ def plot_speed(run: Run, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_barriers(run: Run, *, ax: Axes | None = None) -> Axes:
-    """Plot h of each person and of the nearest wall over time, on a log scale above 0.5 m; safe is h >= 0.
+    """Plot h of each person and the least h of obstacles over time, on a log scale above 0.5 m.
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def plot_barriers(run: Run, *, ax: Axes | None = None) -> Axes:
     >>> ax = figures.plot_barriers(log)
     """
     ax = get_axes(ax, size=(8, 2.5))
-    n = len(run.scenario.people)
+    n, kinds = len(run.zones), {each.kind for each in run.scenario.fixed}
     for i, h in enumerate(run.h[:, :n].T):
         ax.plot(run.time, h, color=RED, label="person" if i == 0 else None)
     if run.h.shape[1] > n:
@@ -148,13 +149,14 @@ def plot_barriers(run: Run, *, ax: Axes | None = None) -> Axes:
             run.h[:, n:].min(axis=1),
             color=BLACK,
             linestyle=":",
-            label="nearest wall",
+            label=f"nearest {kinds.pop() if len(kinds) == 1 else 'obstacle'}",
         )
     ax.axhline(0, color=GREY, linewidth=1)
     ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
     ticks = [0, 0.25, 0.5, 1, 2, 5, 10]
     ax.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
-    low, high = run.h.min(initial=0.0), run.h.max(initial=0.5)
+    low = np.fmin.reduce(run.h, axis=None, initial=0.0)
+    high = np.fmax.reduce(run.h, axis=None, initial=0.5)
     ax.set(xlabel="time [s]", ylabel="h [m]", ylim=(1.2 * low - 0.05, 1.3 * high))
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     return ax
@@ -178,6 +180,7 @@ def plot_robot_paths(runs: Mapping[str, Run], *, ax: Axes | None = None) -> Axes
     """
     ax = get_axes(ax, size=(9, 4))
     first = next(iter(runs.values()))
+    _set_limits(ax, [(run, np.zeros(1, int)) for run in runs.values()])
     _draw_scenery(ax, first.scenario)
     for zone in place_zones(first.zones, first.people[0]):
         _draw_zone(ax, zone, _ZONE_COLOURS(0.5))
@@ -186,7 +189,6 @@ def plot_robot_paths(runs: Mapping[str, Run], *, ax: Axes | None = None) -> Axes
         ax.plot(
             *run.states[:, :2].T, color=colour, linestyle=line, linewidth=2, label=name
         )
-    _set_limits(ax, [(run, np.zeros(1, int)) for run in runs.values()])
     add_legend_below(ax, gap=0.15, ncols=4)
     return label_metres(ax, first.scenario.title)
 
@@ -216,6 +218,9 @@ def plot_crowd(
     second = max(1, round(1 / run.settings.dt))
     distance = np.hypot(run.relative[..., 0], run.relative[..., 1])
     row = int(nanmin(distance, axis=1).argmin())
+    path = np.vstack([run.states[:, :2], run.scenario.goal])
+    low, high = path.min(axis=0) - _CROWD_MARGIN, path.max(axis=0) + _CROWD_MARGIN
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     for i, (x, y) in enumerate(np.moveaxis(run.people[:, :, :2], 0, -1)):
         ax.plot(
             x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None
@@ -233,9 +238,6 @@ def plot_crowd(
     ax.plot(*run.states[::second, :2].T, ".", color=BLUE, markersize=5)
     _draw_scenery(ax, run.scenario)
     _draw_moving(ax, run, row, robot=BLUE, zone=RED)
-    path = np.vstack([run.states[:, :2], run.scenario.goal])
-    low, high = path.min(axis=0) - _CROWD_MARGIN, path.max(axis=0) + _CROWD_MARGIN
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return label_metres(ax, run.scenario.title)
 
 
@@ -260,8 +262,8 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
     rows = np.unique(np.r_[np.arange(0, len(run.states), step), len(run.states) - 1])
     figure = Figure(figsize=(width, width * 0.55), layout="constrained", dpi=70)
     canvas, ax = FigureCanvasAgg(figure), figure.subplots()
-    _draw_scenery(ax, run.scenario)
     _set_limits(ax, [(run, rows)])
+    _draw_scenery(ax, run.scenario)
     label_metres(ax, "t")
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the layout is done
@@ -281,9 +283,8 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
             artist.remove()
         pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         picture = Image.fromarray(pixels).convert("RGB")
-        return picture.quantize(
-            method=Image.Quantize.FASTOCTREE
-        )  # nine times as fast as the default
+        # nine times as fast as the default
+        return picture.quantize(method=Image.Quantize.FASTOCTREE)
 
     first, *more = [draw_frame(row) for row in rows.tolist()]
     gif = io.BytesIO()
@@ -294,15 +295,9 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
 
 
 def _draw_scenery(ax: Axes, scenario: Scenario) -> None:
-    """Draw what does not move: walls and the goal."""
-    for i, wall in enumerate(scenario.walls):
-        ax.plot(
-            *wall.T,
-            color=BLACK,
-            linewidth=3,
-            solid_capstyle="round",
-            label="wall" if i == 0 else None,
-        )
+    """Draw what does not move, within the limits of `ax`: walls, other obstacles, and the goal."""
+    for obstacle in scenario.fixed:
+        draw_obstacle(ax, obstacle)
     ax.plot(
         *scenario.goal,
         "D",

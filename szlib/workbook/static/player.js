@@ -26,9 +26,9 @@ function play(figure, run) {
     drawScene(scene, view, layout, snapshot, snapshots.slice(0, row + 1).map((s) => s.robot));
     drawBarriers(chart, width, 100, times, values, snapshot.t, [0, times[last]], layout.colours);
     const h = snapshot.h === null ? "" : `, least h ${snapshot.h.toFixed(2)} m`;
-    const fallback = !["", "warm", "cold"].includes(snapshot.fallback) ? `, solver: ${snapshot.fallback}` : "";
+    const plan = !["", "optimal"].includes(snapshot.status) ? `, plan: ${snapshot.status}` : "";
     const stuck = snapshot.stuck ? `, no progress for ${snapshot.stuck.toFixed(1)} s` : "";
-    status.textContent = `t = ${snapshot.t.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}${fallback}${stuck}`;
+    status.textContent = `t = ${snapshot.t.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}${plan}${stuck}`;
   };
   const tick = (now) => {
     if (started === null || !figure.isConnected) return;

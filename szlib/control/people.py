@@ -1,4 +1,4 @@
-"""People from one measurement to the next: their headings, their positions now, and people not seen any more.
+"""People as the controller sees them: `Person`, and from one measurement to the next: `Tracker`.
 
 A sensor is noisy and late, and loses people. By the ids of people,
 
@@ -12,6 +12,8 @@ A sensor is noisy and late, and loses people. By the ids of people,
     late        measurements, older than what is known of the same id, are ignored
     ids         that are NaN, or given to two people at once, tell nothing. If a person is more than
                 `SAME_PERSON` from where the same id is expected, they are somebody else
+    lost        people give their place to a person with a new id who is within `SAME_PLACE` of where they are
+                expected: a sensor that changes ids makes nobody appear twice
     the clock   may go back: that step is taken to be as long as the one before, and nobody is forgotten
 """
 
@@ -19,18 +21,136 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass
 from math import atan2, dist, hypot, inf, isfinite
-from typing import NamedTuple, TypeGuard, cast
+from typing import NamedTuple, Protocol, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import LARGEST, Array
-from ..errors import SolverError
-from .person import Person
+from ..checks import LARGEST, Array, check_number, check_point
+from ..errors import SolverError, ZoneError
+from ..zones.ellipses import Ellipse
+
+# Below this speed a person counts as standing, to allow for a tracker's noise [m/s] (assumed).
+STANDING_SPEED = 0.1
+
+
+class SpeedZone(Protocol):
+    """Anything that has a zone for each walking speed, such as `SocialZone`."""
+
+    def ellipse(self, speed: float) -> Ellipse:
+        """The zone at a walking `speed` [m/s], in the person's frame."""
+
+
+def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
+    """Ellipse of `zone` at a walking `speed` [m/s].
+
+    ZoneError if it is none, reaches beyond `LARGEST`, or does not contain the person's position. It may be
+    smaller than a body, as a measured zone may be: `Step.safe` keeps the robot off bodies besides.
+    """
+    if not isinstance(zone, Ellipse):
+        if not hasattr(zone, "ellipse"):
+            raise ZoneError(
+                f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}"
+            )
+        zone = zone.ellipse(speed)
+    (m, n), (a, _) = zone.center, zone.semi_axes
+    if not max(abs(m), abs(n), a) <= LARGEST:
+        raise ZoneError(
+            f"a zone must lie within {LARGEST:g} m of its person; got {zone}"
+        )
+    xa, ya, xb, yb, a = zone.foci_and_axis
+    if hypot(xa, ya) + hypot(xb, yb) > 2 * a * (1 + 1e-9):
+        raise ZoneError(
+            f"a zone must contain its person, who is at (0, 0) of its frame; got {zone}"
+        )
+    return zone
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person as the controller sees them: a state now, and constant velocity from now on.
+
+    Parameters
+    ----------
+    position : (x, y) [m].
+    velocity : (vx, vy) [m/s].
+    heading : direction in which they face, counter-clockwise from x [rad]; None: in which they walk. It stays
+        None if they stand, or with `heading_unknown`; then the circle around their zone is used.
+    zone : their social zone, in their own frame; None: the controller's.
+    id : by which a `Tracker` recognises them; None: they are new at each step.
+    heading_unknown : True if they are too slow for the velocity to give the heading.
+
+    Raises
+    ------
+    SolverError : a number cannot be used (give measurements to `MPCCBF.step` as an array), or a heading is
+        both given and unknown.
+    ZoneError : the zone reaches beyond `LARGEST`, or does not contain the person.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> person = szlib.Person(position=(4.0, 0.0), velocity=(-0.5, 0.0))
+    >>> round(person.heading, 3)
+    3.142
+    >>> person.after(2.0).position
+    (3.0, 0.0)
+    >>> szlib.Person((0.0, 0.0)).heading is None  # they stand: the direction is unknown
+    True
+    """
+
+    position: tuple[float, float]
+    velocity: tuple[float, float] = (0.0, 0.0)
+    heading: float | None = None
+    zone: Ellipse | SpeedZone | None = None
+    id: Hashable = None
+    heading_unknown: bool = False
+
+    def __post_init__(self) -> None:
+        x, y = position = check_point("a person's position", self.position)
+        vx, vy = velocity = check_point("a person's velocity", self.velocity)
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "velocity", velocity)
+        if self.heading is not None:
+            object.__setattr__(
+                self, "heading", check_number("a person's heading", self.heading)
+            )
+            if self.heading_unknown:
+                raise SolverError(
+                    f"a heading is given or unknown; got {self.heading} and heading_unknown for {(x, y)}"
+                )
+        elif not (self.stands or self.heading_unknown):
+            object.__setattr__(self, "heading", atan2(vy, vx))
+        if isinstance(self.zone, Ellipse):
+            as_ellipse(self.zone, 0.0)
+
+    @property
+    def stands(self) -> bool:
+        """True if the velocity is zero."""
+        return self.velocity == (0.0, 0.0)
+
+    def after(self, seconds: float) -> Person:
+        """The same person, `seconds` later."""
+        if self.stands:
+            return self
+        (x, y), (vx, vy) = self.position, self.velocity
+        return self.at((x + vx * seconds, y + vy * seconds))
+
+    def at(self, position: tuple[float, float]) -> Person:
+        """The same person at another `position` [m]; only the position is checked, for speed."""
+        moved = copy(self)
+        object.__setattr__(
+            moved, "position", check_point("a person's position", position)
+        )
+        return moved
+
 
 SAME_PERSON = 2.0
 """Distance from the expected position up to which the same id means the same person [m] (assumed)."""
+SAME_PLACE = 0.5
+"""Distance from where a lost person is expected up to which a new id means the same person [m] (assumed)."""
 _LastSeen = tuple[Person, float]  # a person as last seen, and when [s]
 People = Sequence[Person] | ArrayLike
 """People as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
@@ -113,57 +233,22 @@ class Tracker:
         ------
         SolverError : an argument has the wrong type or shape: an error of the program, not of a sensor.
         """
-        now = check_time(now)
-        if now < self._now:
-            back = self._now + self._interval - now
-            self._last_seen = {
-                k: (person, time - back)
-                for k, (person, time) in self._last_seen.items()
-            }
-        elif now - self._now <= self.memory:
-            self._interval = now - self._now
-        self._now = now
-        if (
-            ids is None
-            and stamps is None
-            and not self._last_seen
-            and _have_no_ids(people)
-        ):
+        self._set_clock(now := check_time(now))
+        has_ids = ids is not None or bool(self._last_seen)
+        if not has_ids and stamps is None and _have_no_ids(people):
             return TrackedPeople(tuple(people))
         rows = _split_rows(people)
-        try:
-            names = (
-                [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
-            )
-            given = Counter(names)
-        except TypeError as error:
-            raise SolverError(
-                f"ids must be a list of hashable values; got {ids!r:.200}"
-            ) from error
-        if len(names) != len(rows):
-            raise SolverError(
-                f"ids must be one for each of {len(rows)} people; got {len(names)}"
-            )
+        names, given = _check_names(ids, rows)
         times = _check_stamps(stamps, len(rows), now)
         self._last_seen = {
             k: v for k, v in self._last_seen.items() if abs(now - v[1]) <= self.memory
         }
         present: list[Person | None] = []
         rejected = unknown = 0
-        row: Person | list[float]
         for row, name, time in zip(rows, names, times, strict=True):
-            if given[name] > 1 or name != name:  # NaN
+            if name is not None and (given[name] > 1 or name != name):  # NaN
                 name = None
-            last = None if name is None else self._last_seen.get(name)
-            if (
-                last is not None
-                and last[1] <= time <= now + self.memory
-                and _is_elsewhere(row, time, *last)
-            ):
-                self._last_seen[Tracker, name], last = (
-                    last,
-                    None,
-                )  # may be hidden, and has no id any more
+            last = None if name is None else self._recall(row, name, time, now, given)
             found, usable = self._update(row, name, time, now, last)
             if found is not None and name is not None and (usable or last is not None):
                 self._last_seen[name] = found
@@ -175,9 +260,48 @@ class Tracker:
             for name, seen in self._last_seen.items()
             if name not in given
         ]
-        return TrackedPeople(
-            tuple(person for person in present if person is not None), rejected, unknown
-        )
+        known = tuple(person for person in present if person is not None)
+        return TrackedPeople(known, rejected, unknown)
+
+    def _set_clock(self, now: float) -> None:
+        """Begin a step at the time `now`; if the clock went back, so do the times of everybody."""
+        if now < self._now:
+            back = self._now + self._interval - now
+            self._last_seen = {
+                name: (person, time - back)
+                for name, (person, time) in self._last_seen.items()
+            }
+        elif now - self._now <= self.memory:
+            self._interval = now - self._now
+        self._now = now
+
+    def _recall(
+        self,
+        row: Person | list[float],
+        name: Hashable,
+        time: float,
+        now: float,
+        given: Counter[Hashable],
+    ) -> _LastSeen | None:
+        """What is known of the person of a measurement: by their id, or by their place if the id is new."""
+        is_in_time = time <= now + self.memory
+        last = self._last_seen.get(name)
+        if last is None and is_in_time:
+            lost = [
+                (_measure_deviation(row, time, *seen), other)
+                for other, seen in self._last_seen.items()
+                if other not in given and seen[1] <= time
+            ]
+            nearest, other = min(lost, key=lambda each: each[0], default=(inf, None))
+            return self._last_seen.pop(other) if nearest <= SAME_PLACE else None
+        is_later = last is not None and last[1] <= time and is_in_time
+        if last is not None and is_later:
+            deviation = _measure_deviation(row, time, *last)
+            if SAME_PERSON < deviation < inf:
+                # may be hidden, and has no id any more
+                self._last_seen[Tracker, name] = last
+                return None
+        return last
 
     def _update(
         self,
@@ -229,15 +353,14 @@ def _move_forward(person: Person, time: float, now: float) -> Person | None:
     return person.at(position) if _are_usable(*position) else None
 
 
-def _is_elsewhere(
+def _measure_deviation(
     row: Person | list[float], time: float, person: Person, seen: float
-) -> bool:
-    """True if the measurement of this `time` is too far from a `person` who was `seen` before."""
+) -> float:
+    """Distance from a measurement of this `time` to where a `person`, `seen` before, is expected [m]."""
     x, y = row.position if isinstance(row, Person) else row[:2]
     expected = _move_forward(person, seen, time)
-    return bool(
-        expected and _are_usable(x, y) and dist((x, y), expected.position) > SAME_PERSON
-    )
+    is_known = expected is not None and _are_usable(x, y)
+    return dist((x, y), expected.position) if expected and is_known else inf
 
 
 def _are_usable(x: float, y: float) -> bool:
@@ -271,6 +394,24 @@ def _split_rows(people: People) -> Sequence[Person | list[float]]:
             f"people as an array must have shape (n, 4): x, y, vx, vy; got {numbers.shape}"
         )
     return cast(list[list[float]], numbers.reshape(-1, 4).tolist())
+
+
+def _check_names(
+    ids: Iterable[Hashable] | None, rows: Sequence[Person | list[float]]
+) -> tuple[list[Hashable], Counter[Hashable]]:
+    """The id of each person, or None, and how often each id was given."""
+    try:
+        names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
+        given = Counter(name for name in names if name is not None)
+    except TypeError as error:
+        raise SolverError(
+            f"ids must be a list of hashable values; got {ids!r:.200}"
+        ) from error
+    if len(names) != len(rows):
+        raise SolverError(
+            f"ids must be one for each of {len(rows)} people; got {len(names)}"
+        )
+    return names, given
 
 
 def _check_stamps(stamps: ArrayLike | None, n: int, now: float) -> list[float]:

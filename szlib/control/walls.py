@@ -1,4 +1,4 @@
-"""Walls from maps: occupancy grids of ROS map_server, and other grids of cells.
+"""Walls from lines, polygons and maps: occupancy grids of ROS map_server, and other grids of cells.
 
 The cells that are occupied are united and simplified; the outlines are the walls.
 """
@@ -6,8 +6,11 @@ The cells that are occupied are united and simplified; the outlines are the wall
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from math import cos, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -15,10 +18,10 @@ import yaml
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from ..checks import check_array, check_number, require
+from ..checks import Array, check_array, check_number, require
 from ..errors import DataError, SolverError
 from ..input_files import printable, read_small
-from .barriers import Walls, euclidean_segment_formula, read_walls
+from .obstacles import SHORTEST_WALL, Wall, check_wall
 
 _NUMBERS = {"origin": (3,), "resolution": (), "free_thresh": (), "occupied_thresh": ()}
 _EIGHT_BITS = ("1", "L", "LA", "P", "PA", "RGB", "RGBA")
@@ -33,6 +36,105 @@ _FAULTS = (
     Image.DecompressionBombError,
 )
 Circle = tuple[float, float, float]
+
+
+def read_walls(walls: Any) -> Array:
+    """Read walls as segments, shape (n, 2, 2) [m], in the order in which they are given.
+
+    Parameters
+    ----------
+    walls : segments, shape (2, 2) each; polylines, shape (m, 2); Shapely's lines, rings, polygons and
+        collections, or objects with `.coords`, `.exterior` and `.interiors`, or `.geoms` like them; one or
+        many, nested in any way. The outline of a polygon and the edges of its holes are walls; to an `MPCCBF`
+        it is solid, so give a room by its `exterior`. Corners of a line that are closer than `SHORTEST_WALL`
+        count as one.
+
+    Raises
+    ------
+    SolverError : something is no wall, or a number cannot be used.
+
+    Examples
+    --------
+    >>> from szlib.control import read_walls
+    >>> read_walls([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]).shape  # a polyline of two segments
+    (2, 2, 2)
+    """
+    segments = [
+        check_wall(segment)
+        for line in _find_lines(walls)
+        for segment in _split_line(line)
+    ]
+    return np.reshape(np.array(segments, float), (-1, 2, 2))
+
+
+class Walls(np.ndarray[Any, np.dtype[np.float64]]):
+    """Segments, shape (n, 2, 2) [m], that know which areas they enclose; what is computed from them does not.
+
+    Attributes
+    ----------
+    solids : these areas, of Shapely; None: not known.
+    """
+
+    solids: Any = None
+
+
+def find_solids(walls: Any) -> Any:
+    """The union of the polygons among `walls`, and of `Walls.solids`; None if there are none."""
+    if hasattr(walls, "exterior"):
+        return shapely.make_valid(
+            shapely.Polygon(
+                walls.exterior.coords, [hole.coords for hole in walls.interiors]
+            )
+        )
+    parts = getattr(walls, "geoms", walls)
+    if isinstance(parts, np.ndarray) or not isinstance(parts, Iterable):
+        return getattr(walls, "solids", None)
+    found = [solid for part in parts if (solid := find_solids(part)) is not None]
+    return shapely.union_all(found) if found else None
+
+
+def _find_lines(walls: Any) -> Iterator[Any]:
+    """Find each line among nested `walls`, as a list of its corners."""
+    if hasattr(walls, "geoms"):
+        parts = list(walls.geoms)
+    elif hasattr(walls, "exterior"):
+        parts = [walls.exterior, *walls.interiors]
+    elif hasattr(walls, "coords"):
+        parts = [corner[:2] for corner in walls.coords]
+    elif isinstance(walls, Iterable) and not isinstance(walls, str):
+        parts = list(walls)
+    else:
+        raise SolverError(
+            f"a wall must be a segment, a line, or one of Shapely's; got {walls!r}"
+        )
+    if parts and all(_is_corner(part) for part in parts):
+        yield parts
+    else:
+        for part in parts:
+            yield from _find_lines(part)
+
+
+def _is_corner(part: Any) -> bool:
+    return isinstance(part, Sequence | np.ndarray) and all(
+        np.isscalar(number) for number in part
+    )
+
+
+def _split_line(line: Any) -> list[Array]:
+    """Split a line into its segments."""
+    if np.shape(line)[1:] == (4,):
+        raise SolverError(
+            "walls must be segments [[(xa, ya), (xb, yb)], ...], shape (n, 2, 2); got rows of four numbers: "
+            "use np.reshape(walls, (-1, 2, 2))"
+        )
+    corners = check_array("a wall", line, (..., 2))
+    if len(corners) < 2:
+        raise SolverError(f"a wall needs two end points; got {corners.tolist()}")
+    separate = [corners[0]]
+    for corner in corners[1:]:
+        if np.hypot(*(corner - separate[-1])) >= SHORTEST_WALL:
+            separate.append(corner)
+    return [np.array(ends) for ends in pairwise(separate)] or [corners[[0, -1]]]
 
 
 def walls_from_map(
@@ -195,9 +297,8 @@ def walls_from_grid(
     segments = read_walls(solids)
     if near is not None:
         px, py, r = check_array("near", near, (3,)).tolist()
-        segments = segments[
-            euclidean_segment_formula(px, py, *segments.reshape(-1, 4).T) <= r
-        ]
+        gaps = Wall.gap(px, py, 0.0, *segments.reshape(-1, 4).T)
+        segments = segments[gaps <= r]
     walls = segments.view(Walls)
     walls.solids = solids
     return walls

@@ -1,4 +1,4 @@
-"""Maps of ROS become walls: where, which cells, how few, and what is wrong with a bad one."""
+"""Walls from lines, polygons and maps of ROS: where, how few, and what is wrong with a bad one."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 from PIL import Image
-from szlib.control.obstacles import find_solids
 
 import szlib
 from szlib.control import read_walls, walls_from_grid
+from szlib.control.walls import find_solids
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 GREY = NDArray[np.uint8]
@@ -197,6 +197,82 @@ def test_a_bad_grid_is_an_error() -> None:
     ):
         with pytest.raises(szlib.SolverError):
             walls_from_grid(*arguments)
+
+
+# --- walls of any shape -----------------------------------------------------------------------------
+
+
+BOX = shapely.box(0, 0, 4, 2)
+
+
+@pytest.mark.parametrize(
+    ("walls", "count"),
+    [
+        ([], 0),
+        (np.zeros((0, 2, 2)), 0),
+        ([[(0, 0), (1, 0)], [(1, 0), (1, 1)]], 2),
+        ([(0, 0), (1, 0), (1, 1)], 2),
+        (np.array([(0, 0), (1, 0), (1, 1), (0, 1)]), 3),
+        ([[(0, 0), (1, 0), (1, 1)], [(5, 5), (6, 6)]], 3),
+        (shapely.LineString([(0, 0), (1, 0), (1, 0), (1, 1)]), 2),
+        (shapely.LineString([(0, 0, 7), (1, 0, 7)]), 1),
+        ([shapely.LineString([(0, 0), (1, 0)]), [(2, 2), (3, 3)]], 2),
+        (BOX, 4),
+        (BOX.difference(shapely.box(1, 0.5, 2, 1)), 8),
+        (shapely.MultiLineString([[(0, 0), (1, 0)], [(2, 0), (3, 0), (4, 0)]]), 3),
+        (shapely.GeometryCollection([BOX, shapely.LineString([(9, 9), (8, 8)])]), 5),
+        (shapely.union(BOX, shapely.box(8, 0, 9, 1)), 8),
+        (BOX.exterior, 4),
+    ],
+    ids=lambda each: type(each).__name__ if not isinstance(each, int) else str(each),
+)
+def test_walls_may_be_segments_lines_and_shapes(walls: Any, count: int) -> None:
+    segments = read_walls(walls)
+    assert segments.shape == (count, 2, 2)
+    if hasattr(walls, "boundary") and hasattr(walls, "length"):
+        assert np.hypot(*(segments[:, 1] - segments[:, 0]).T).sum() == pytest.approx(
+            walls.length
+        )
+    assert np.array_equal(szlib.MPCCBF(ZONE, walls=walls).walls, segments)
+
+
+def test_the_same_wall_in_any_shape_gives_the_same_control() -> None:
+    rings = [BOX, BOX.exterior, list(BOX.exterior.coords), read_walls(BOX)]
+    steps = [
+        szlib.MPCCBF(ZONE, walls=walls).step((-1.0, 1.0, 0.4, 0), (5.0, -2.0))
+        for walls in rings
+    ]
+    assert all(np.array_equal(step.control, steps[0].control) for step in steps)
+    assert len(steps[0].h) == 4
+
+
+@pytest.mark.parametrize(
+    "walls",
+    [
+        5,
+        "wall",
+        None,
+        shapely.Point(0, 0),
+        [(0, 0)],
+        [(0, 0, 0), (1, 1, 1)],
+        [[(0, 0), (0, 0), (0, 0)]],
+    ],
+)
+def test_objects_that_are_not_walls_raise_an_error(walls: Any) -> None:
+    with pytest.raises(szlib.SolverError, match="wall"):
+        szlib.MPCCBF(ZONE, walls=walls)
+
+
+@pytest.mark.parametrize("kind", [szlib.MPCCBF, szlib.DifferentialDrive])
+def test_rows_of_four_numbers_are_refused_with_what_was_expected(kind: Any) -> None:
+    rows = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 2.0, 1.0, 2.0]])
+    with pytest.raises(szlib.SolverError, match=r"shape \(n, 2, 2\); got rows of four"):
+        kind(ZONE, walls=rows)
+    controller = kind(ZONE, walls=np.reshape(rows, (-1, 2, 2)))  # as the error says
+    assert controller.walls.shape == (2, 2, 2)
+    with pytest.raises(szlib.SolverError, match="rows of four numbers"):
+        controller.set_walls(rows.tolist())
+    assert controller.walls.shape == (2, 2, 2), "it keeps those that it had"
 
 
 # --- solid walls -------------------------------------------------------------------------------------

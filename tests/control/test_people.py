@@ -1,4 +1,4 @@
-"""People as a sensor measures them: headings by id, time stamps, hidden people, unusable numbers."""
+"""People as a sensor measures them: headings, changing ids, time stamps, hidden people, unusable numbers."""
 
 import numpy as np
 import pytest
@@ -10,10 +10,16 @@ from szlib.zones.ellipses import circle_around
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 GOAL = (4.0, 0.0)
 SOLVERS = ("sqp", "ipopt")
+START = (-4.0, 0.0, 0.0, 0.0)
+
+
+def positions(seen):
+    return [pytest.approx(person.position) for person in seen.people]
 
 
 def controller_of(solver="sqp", **more):
-    return szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver), **more)
+    settings = szlib.MPCSettings(solver=solver, time_limit=np.inf)
+    return szlib.MPCCBF(ZONE, settings=settings, **more)
 
 
 def headings(seen):
@@ -73,7 +79,7 @@ def test_noise_does_not_turn_the_zone_of_a_standing_person():
         assert headings(seen) == headings(walked)
         assert [p.velocity for p in seen.people] == [tuple(row[2:]) for row in noisy]
         assert headings(tracker.see(noisy, now=0.1 * k))[:2] == [None, None], (
-            "nobody knows them without ids"
+            "they are unknown without ids"
         )
 
 
@@ -103,7 +109,128 @@ def test_persons_without_id_are_used_unchanged():
     assert szlib.Tracker().see(people, now=3.0) == (people, 0, 0)
 
 
+# ids that identify nobody
+
+
+@pytest.mark.parametrize("ids", [[np.nan], [float("nan")], [np.float64("nan")]])
+def test_an_id_that_is_nan_is_no_id(ids):
+    tracker = szlib.Tracker()
+    for k in range(5):
+        assert (
+            len(tracker.see([[0.1 * k, 0.0, 1.0, 0.0]], ids=ids, now=0.1 * k).people)
+            == 1
+        )
+    assert tracker.see(now=0.5).people == ()
+
+
+def test_an_id_that_two_people_have_at_once_is_no_id():
+    tracker, rows = szlib.Tracker(), [[0.0, 0.0, 0.0, 0.0], [4.0, 0.0, 1.0, 0.0]]
+    for k in range(5):
+        seen = tracker.see(rows, ids=["a", "a"], now=0.1 * k)
+        assert (
+            positions(seen) == [(0.0, 0.0), (4.0, 0.0)]
+            and seen.people[0].heading is None
+        )
+    assert tracker.see([[np.nan] * 4, rows[1]], ids=["a", "a"], now=0.6).unknown == 1
+
+
+def test_an_id_reused_metres_away_is_another_person_and_the_first_is_remembered():
+    tracker = szlib.Tracker()
+    tracker.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], now=0.0)
+    seen = tracker.see([[5.0, 3.0, 0.0, 0.0]], ids=["a"], now=0.1)
+    assert positions(seen) == [(5.0, 3.0), (0.1, 0.0)]
+    assert [person.heading for person in seen.people] == [None, 0.0], (
+        "no heading of somebody else"
+    )
+    assert positions(tracker.see([[5.0, 3.0, 0.0, 0.0]], ids=["a"], now=1.5)) == [
+        (5.0, 3.0)
+    ]
+    near = tracker.see([[6.0, 3.0, 0.0, 0.0]], ids=["a"], now=1.6)
+    assert positions(near) == [(6.0, 3.0)], "a metre is noise"
+
+
+# ids that change
+
+
+def walk(tracker, make_id, n=60, hide=lambda k: False, noise=0.02):
+    """What the tracker knows of a person who walks at 1.2 m/s past another one with the id "b"."""
+    rng, found = np.random.default_rng(8), []
+    for k in range(n):
+        rows = np.array([[0.12 * k, 0.0, 1.2, 0.0], [3.0, 1.0, 0.0, 0.0]])
+        rows += rng.normal(0, noise, (2, 4))
+        kept = [1] if hide(k) else [0, 1]
+        ids = [(make_id(k), "b")[i] for i in kept]
+        found.append(tracker.see(rows[kept], ids=ids, now=0.1 * k))
+    return found
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 7])
+def test_a_person_whose_id_changes_stays_one_person(frames):
+    for seen in walk(szlib.Tracker(), lambda k: k // frames):
+        assert len(seen.people) == 2 and seen.rejected == seen.unknown == 0
+    # hidden in every fifth frame, and then with a new id
+    for seen in walk(szlib.Tracker(), lambda k: k // 5, hide=lambda k: k % 5 == 4):
+        assert len(seen.people) == 2
+
+
+def test_a_new_id_keeps_the_heading_of_the_person_who_was_lost():
+    tracker = szlib.Tracker()
+    tracker.see([[0.0, 0.0, 0.6, 0.8]], ids=["a"], now=0.0)
+    heading = np.arctan2(0.8, 0.6)
+    for k, name in enumerate("bcd", start=1):
+        seen = tracker.see([[0.06, 0.08, 0.01, 0.0]], ids=[name], now=0.1 * k)
+        assert headings(seen) == [pytest.approx(heading)]
+
+
+def test_a_new_id_farther_away_or_beside_a_person_who_is_seen_is_another_person():
+    far = szlib.Tracker()
+    far.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], now=0.0)
+    seen = far.see([[0.1, 0.51, 1.0, 0.0]], ids=["b"], now=0.1)
+    assert len(seen.people) == 2, "0.51 m from where the first one is expected"
+    near = szlib.Tracker()
+    near.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], now=0.0)
+    rows = [[0.1, 0.0, 1.0, 0.0], [0.1, 0.4, 1.0, 0.0]]
+    assert len(near.see(rows, ids=["a", "b"], now=0.1).people) == 2
+    assert len(near.see(rows, ids=["b", "c"], now=0.2).people) == 2
+    assert len(near.see(rows, ids=["c", "b"], now=0.3).people) == 2
+
+
+def test_each_lost_person_gives_their_place_to_one_new_id():
+    tracker, rows = szlib.Tracker(), [[0.0, 0.0, 0.0, 0.0], [0.0, 0.3, 0.0, 0.0]]
+    tracker.see(rows, ids=["a", "b"], now=0.0)
+    for k in range(1, 9):
+        seen = tracker.see(rows, ids=[f"c{k}", f"d{k}"], now=0.1 * k)
+        assert len(seen.people) == 2
+    three = [*rows, [0.0, 0.15, 0.0, 0.0]]
+    assert len(tracker.see(three, ids=["x", "y", "z"], now=1.0).people) == 3
+
+
+def test_a_robot_does_not_yield_to_ghosts():
+    """With an id that changes every three frames, each step is the one with the true id."""
+    controllers = [controller_of(), controller_of()]
+    state, person = np.array([-3.0, 0.0, 0.5, 0.0]), np.array([3.0, 0.4, -0.9, 0.0])
+    for k in range(50):
+        steps = [
+            each.step(state, GOAL, person[None], ids=[name])
+            for each, name in zip(controllers, ("a", f"a{k // 3}"), strict=True)
+        ]
+        assert len(steps[1].h) == 1
+        assert np.array_equal(steps[0].inputs, steps[1].inputs)
+        state = advance(state, steps[0].control, 0.1)
+        person[:2] += 0.1 * person[2:]
+
+
 # time
+
+
+def test_a_look_that_is_older_than_the_known_one_is_ignored():
+    tracker = szlib.Tracker()
+    tracker.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], stamps=5.0, now=5.0)
+    late = tracker.see([[-0.5, 0.3, 0.0, 1.0]], ids=["a"], stamps=4.8, now=5.1)
+    assert positions(late) == [(0.1, 0.0)] and late[1:] == (0, 0)
+    assert positions(
+        tracker.see([[0.3, 0.0, 1.0, 0.0]], ids=["a"], stamps=5.2, now=5.2)
+    ) == [(0.3, 0.0)]
 
 
 def test_people_are_moved_forward_to_now():
@@ -236,6 +363,31 @@ def test_tracker_parameters_must_be_finite_and_not_negative(name, value):
         szlib.Tracker(**{name: value})
 
 
+# zones that do not hold their person
+
+
+def test_a_zone_that_does_not_contain_its_person_is_refused():
+    for bad in (szlib.Ellipse((50, 0), (1, 0.7)), szlib.Ellipse((0, 0.71), (1, 0.7))):
+        with pytest.raises(szlib.ZoneError, match="must contain its person"):
+            szlib.MPCCBF(bad)
+        with pytest.raises(szlib.ZoneError, match="must contain its person"):
+            szlib.Person((0, 0), zone=bad)
+
+        class Fitted:
+            def ellipse(self, speed, bad=bad):
+                return bad
+
+        with pytest.raises(szlib.ZoneError, match="must contain its person"):
+            szlib.MPCCBF(ZONE).step(
+                START, GOAL, [szlib.Person((0, 0), heading=0.0, zone=Fitted())]
+            )
+    for edge in (
+        szlib.Ellipse((0, 0.7), (1, 0.7)),
+        szlib.Ellipse((0, 0), (0.05, 0.05)),
+    ):
+        assert szlib.MPCCBF(edge).zone == edge
+
+
 # arrays
 
 
@@ -286,25 +438,7 @@ def test_a_person_met_head_on_is_passed_despite_noise(solver):
     assert state[:2] == pytest.approx(GOAL, abs=0.1)
 
 
-# goals that cannot be reached
-
-
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_a_goal_at_a_wall_raises_at_the_first_step_and_sets_goal_blocked_later(solver):
-    walls, behind = [[(-6, 3), (6, 3)]], (3.0, 2.9)
-    settings = szlib.MPCSettings(solver=solver)
-    controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
-    assert controller.goal_blocked(behind) and not controller.goal_blocked(GOAL)
-    with pytest.raises(szlib.SolverError, match="cannot be reached"):
-        controller.step((-4, 0, 0, 0), behind)
-    state = np.array([-4.0, 0.0, 0.0, 0.0])
-    assert not controller.step(state, GOAL).goal_blocked
-    for _ in range(300):
-        step = controller.step(state, behind)
-        assert step.goal_blocked and step.safe
-        state = advance(state, step.control, 0.1)
-    assert state[[0, 2, 3]] == pytest.approx((3, 0, 0), abs=1e-2), "it waits beside it"
-    assert 0 <= step.h[0] < 0.15
+# a person on the goal
 
 
 def test_a_person_standing_on_the_goal_blocks_it_despite_noise():
@@ -346,3 +480,23 @@ def test_stamps_that_are_no_numbers_are_refused(stamps):
 def test_people_that_are_no_rows_are_refused(people):
     with pytest.raises(szlib.SolverError, match="people"):
         szlib.Tracker().see(people, now=0.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"position": (0, np.nan), "heading": 0.0}, "position must be finite"),
+        ({"position": (0, 0), "velocity": (np.inf, 0)}, "velocity must be finite"),
+        ({"position": (0, 0, 0), "heading": 0.0}, "position must have shape"),
+        (
+            {"position": (0, 0), "heading": 0.1, "heading_unknown": True},
+            "given or unknown",
+        ),
+        ({"position": (0, 0), "heading": np.nan}, "heading must be finite"),
+        ({"position": (1e155, 0), "heading": 0.0}, "position must lie within"),
+        ({"position": (0, 0), "velocity": (0, -1e155)}, "velocity must lie within"),
+    ],
+)
+def test_a_person_with_unusable_numbers_raises_an_error(arguments, message):
+    with pytest.raises(szlib.SolverError, match=message):
+        szlib.Person(**arguments)

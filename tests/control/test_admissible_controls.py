@@ -9,8 +9,7 @@ import pytest
 import shapely
 
 import szlib
-from szlib.control.acceleration_polygon import _residuals, find_admissible_controls
-from szlib.control.step import Step
+from szlib.control import Step, find_admissible_controls
 
 ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
 PASSAGE = szlib.SCENARIOS["making_room"].walls
@@ -36,17 +35,19 @@ MOMENTS = {
 def step_at(
     state: list[float], person: szlib.Person, walls: object, **settings: object
 ) -> Step:
-    controller = szlib.MPCCBF(ZONE, walls=walls, settings=szlib.MPCSettings(**settings))
+    controller = szlib.MPCCBF(
+        ZONE,
+        walls=walls,
+        settings=szlib.MPCSettings(**{"time_limit": np.inf} | settings),
+    )
     return controller.step(state, (6.0, 0.0), [person])
 
 
 def with_first(step: Step, a: np.ndarray) -> Step:
     """The same plan, but for its first acceleration."""
-    x, k = step.predicted.copy(), np.arange(1, len(step.predicted))[:, None]
-    dt = step.scene.settings.dt
-    x[1:, :2] += dt**2 * (k - 0.5) * (a - step.control)
-    x[1:, 2:] += dt * (a - step.control)
-    return replace(step, control=a, predicted=x)
+    inputs = step.inputs.copy()
+    inputs[0] = a
+    return replace(step, control=a, inputs=inputs)
 
 
 @pytest.mark.parametrize("n_h", [2, 8])
@@ -95,9 +96,11 @@ def test_a_robot_alone_at_rest_may_choose_every_acceleration() -> None:
 
 def test_each_limit_names_its_obstacle_and_has_the_allowed_side_on_its_left() -> None:
     found = find_admissible_controls(step_at(*MOMENTS["backing out"]))
-    assert {(each.kind, each.number) for each in found.limits} == {
-        ("person", 0),
-        ("wall", 1),
+    step = step_at(*MOMENTS["backing out"])
+    names = {step.scene.name(each.row).partition(" (")[0] for each in found.limits}
+    assert names == {"person 0", "wall 1"} and {each.k for each in found.limits} <= {
+        0,
+        1,
     }
     inner = np.array(found.polygon.representative_point().coords[0])
     for limit in found.limits:
@@ -113,18 +116,25 @@ def test_the_control_of_an_infeasible_plan_lies_outside_the_polygon() -> None:
     )
 
 
-@pytest.mark.parametrize("n_people", [1, 2, 4])
-def test_each_row_has_the_gamma_of_its_barrier_however_crowded_it_is(
-    n_people: int,
-) -> None:
-    crowding = szlib.control.Crowding(gamma=0.3)
-    settings = szlib.MPCSettings(gamma=0.05, crowding=crowding)
-    people = [
-        szlib.Person((3.0, y), (-0.5, 0.0)) for y in (0.0, 1.5, -1.5, 2.5)[:n_people]
-    ]
-    step = szlib.MPCCBF(ZONE, walls=PASSAGE, settings=settings).step(
-        [0.0, 0.0, 0.5, 0.0], (6.0, 0.0), people
-    )
-    assert step.scene.level == {1: "alone", 2: "few", 4: "crowd"}[n_people]
-    chosen = np.broadcast_to(step.control, (*step.residual.shape, 1, 2))
-    assert _residuals(step, chosen)[..., 0] == pytest.approx(step.residual, abs=1e-9)
+def test_a_decay_with_a_price_limits_the_polygon_as_a_hard_one() -> None:
+    state, person, walls = MOMENTS["at full speed"]
+    changes = {"N_h": 8, "gamma": 0.2}
+    priced = step_at(state, person, walls, decay_price=100.0, **changes)
+    polygon, inside = find_admissible_controls(priced).polygon, 0
+    for a in np.random.default_rng(1).uniform(-1, 1, (80, 2)):
+        if polygon.boundary.distance(shapely.Point(a)) > 2e-3:
+            inside += polygon.covers(shapely.Point(a))
+            obeys = with_first(priced, a).residual.min() >= 0
+            fast = np.hypot(*with_first(priced, a).predicted[1:, 2:].T).max() > 1
+            assert polygon.covers(shapely.Point(a)) == (obeys and not fast)
+    assert inside > 2
+
+
+def test_limits_are_rows_of_the_step_among_many_walls() -> None:
+    """Obstacles that were left out are counted: `row` is a place in `Step.obstacles`."""
+    far = [[(x, 30.0), (x + 0.5, 30.0)] for x in range(30)]
+    walls = np.array([*far, [(-6.0, 1.0), (6.0, 1.0)]])
+    step = step_at([0.0, 0.3, 0.0, 0.3], szlib.Person((40.0, 0.0)), walls)
+    assert step.scene.near == (30,)
+    (row,) = {each.row for each in find_admissible_controls(step).limits}
+    assert step.obstacles[row].numbers == (-6.0, 1.0, 6.0, 1.0)

@@ -1,0 +1,667 @@
+"""What the robot keeps out of: zones of people, their bodies, walls, and whatever a user adds.
+
+An obstacle is one class: the distance of a point, and the priority with which the robot keeps out.
+
+    segment     g = [(x-xa)(yb-ya) - (y-ya)(xb-xa)] / L,   t = [(L/2)^2 - |x-xc|^2] / L
+                d = sqrt(g^2 + ((|t| - t)/2)^2)                            (paper, eq. 3-5)
+    ellipse     d = (|x-ca| + |x-cb|)/2 - a,  ca and cb the foci          (paper, eq. 7)
+    barrier     h = d - r_robot - margin, safe where h >= 0                (paper, sec. 4)
+    condition   h(x_{k+1}) - h(x_k) >= -gamma h(x_k)                       (paper, eq. 1)
+
+`|t| - t` stands for the paper's norm of a scalar. The controller, its steps, the runs and the figures know
+nothing of single kinds. Each formula is written once, with operators only, so that the same lines run on
+floats, on NumPy arrays and on CasADi's symbols.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from enum import IntEnum
+from itertools import groupby
+from math import cos, hypot, sin
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import Array, check_array
+from ..errors import SolverError
+from ..zones.ellipses import BODY_RADIUS, Ellipse
+from .settings import MPCSettings
+
+# Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre.
+SHORTEST_WALL = 1e-3
+
+
+def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
+    """Approximate distance of (`x`, `y`) to the segment (`xa`, `ya`) to (`xb`, `yb`) [m] (paper, eq. 3-5)."""
+    length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+    g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+    t = (
+        (length / 2) ** 2 - (x - (xa + xb) / 2) ** 2 - (y - (ya + yb) / 2) ** 2
+    ) / length
+    return (g**2 + ((abs(t) - t) / 2) ** 2) ** 0.5
+
+
+def euclidean_segment_formula(
+    x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any
+) -> Any:
+    """Euclidean distance of (`x`, `y`) to the segment from (`xa`, `ya`) to (`xb`, `yb`) [m]."""
+    length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+    g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+    along = ((x - (xa + xb) / 2) * (xb - xa) + (y - (ya + yb) / 2) * (yb - ya)) / length
+    beyond = abs(along) - length / 2
+    return (g**2 + ((abs(beyond) + beyond) / 2) ** 2) ** 0.5
+
+
+def ellipse_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any, a: Any) -> Any:
+    """Approximate distance of (`x`, `y`) to an ellipse [m] (paper, eq. 7).
+
+    The foci are (`xa`, `ya`) and (`xb`, `yb`), the semi-major axis is `a`.
+    """
+    return (
+        ((x - xa) ** 2 + (y - ya) ** 2) ** 0.5 + ((x - xb) ** 2 + (y - yb) ** 2) ** 0.5
+    ) / 2 - a
+
+
+def barrier(distance: Any, radius: float, margin: Any) -> Any:
+    """Barrier h = d - r_robot - eps [m]: safe where it is not negative (paper, sec. 4).
+
+    Parameters
+    ----------
+    distance : d, to a wall or a zone [m].
+    radius : of the robot [m].
+    margin : eps [m].
+
+    Examples
+    --------
+    >>> from szlib.control import barrier
+    >>> barrier(2.0, radius=0.5, margin=0.25)
+    1.25
+    """
+    return distance - (radius + margin)
+
+
+def cbf_residual(h_next: Any, h: Any, gamma: float) -> Any:
+    """Residual of the discrete CBF condition [m]: satisfied where it is not negative (paper, eq. 1).
+
+    Parameters
+    ----------
+    h_next : h one step later [m].
+    h : now [m].
+    gamma : fraction of h that a step may use up.
+
+    Examples
+    --------
+    >>> from szlib.control import cbf_residual
+    >>> cbf_residual(h_next=0.5, h=1.0, gamma=0.5)
+    0.0
+    """
+    return h_next - (1 - gamma) * h
+
+
+def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
+    """Approximate distance of points to the segment from a to b (paper, eq. 3-5).
+
+    It is zero exactly on the segment and positive elsewhere. It is Euclidean for points in the disc that has
+    the segment as its diameter; beyond, it is an approximation that is exact to first order at the ends.
+
+    Parameters
+    ----------
+    points : positions, shape (..., 2) [m].
+    a, b : end points, shape (2,) [m].
+
+    Returns
+    -------
+    Distances, shape (...) [m].
+
+    Raises
+    ------
+    SolverError : the segment has no length, or a shape or a number cannot be used.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> szlib.segment_distance([(0.0, 0.5), (0.0, -0.5)], (-1.0, 0.0), (1.0, 0.0)).tolist()
+    [0.5, 0.5]
+    """
+    xy = check_array("points", points, (..., 2))
+    (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
+    return np.asarray(segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
+
+
+def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
+    """Approximate signed distance of points to an ellipse, from the sum of focal distances (paper, eq. 7).
+
+    It is zero on the ellipse, negative inside (at least -(a - c)), and positive outside. For a circle it is
+    Euclidean.
+
+    Parameters
+    ----------
+    points : positions, shape (..., 2), in the frame of the ellipse's centre [m].
+    ellipse : the social zone.
+
+    Returns
+    -------
+    Distances, shape (...) [m].
+
+    Examples
+    --------
+    >>> import szlib
+    >>> circle = szlib.Ellipse(center=(0.0, 0.0), semi_axes=(1.0, 1.0))
+    >>> szlib.ellipse_distance([(2.0, 0.0), (0.0, 0.0)], circle).tolist()
+    [1.0, -1.0]
+    """
+    xy = check_array("points", points, (..., 2))
+    return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], *ellipse.foci_and_axis))
+
+
+def check_wall(wall: ArrayLike) -> Array:
+    """End points of a `wall`, shape (2, 2) [m]; SolverError if it is shorter than `SHORTEST_WALL`."""
+    ends = check_array("wall", wall, (2, 2))
+    length = np.hypot(*(ends[1] - ends[0]))
+    if length == 0:
+        raise SolverError(
+            f"a wall needs two different end points; got {ends[0].tolist()} twice"
+        )
+    if length < SHORTEST_WALL:
+        raise SolverError(
+            f"a wall must be at least {SHORTEST_WALL} m long; got {length:.3g} m from {ends[0].tolist()}; "
+            "leave it out or join it to its neighbour"
+        )
+    return ends
+
+
+Point = tuple[float, float]
+
+
+class Priority(IntEnum):
+    """What a plan violates last: never a lower number to satisfy a higher one.
+
+    WALL : what stands still and is known. BODY : bodies of people. ZONE : h >= 0 of their zones.
+    DECAY : the barrier condition of all of these (paper, eq. 1).
+    """
+
+    WALL = 0
+    BODY = 1
+    ZONE = 2
+    DECAY = 3
+
+
+class Obstacle:
+    """Base class of obstacles: derive from it, and write `distance`.
+
+    Parameters
+    ----------
+    numbers : the parameters of `distance`, finite.
+
+    Attributes
+    ----------
+    kind : name of the class in logs and explanations, such as "wall"; by default that of the class.
+    priority : which violation is worse, if the robot cannot avoid all.
+    has_barrier : False: h >= 0 is required, not the barrier condition.
+
+    Notes
+    -----
+    `distance` must be convex along straight lines, also if the obstacle moves, and must not change by more
+    than the robot and the obstacle move; else write `bound_way`.
+
+    Examples
+    --------
+    A round table, of which the controller knows nothing but this:
+
+    >>> import szlib
+    >>> class Table(szlib.control.Obstacle):
+    ...     kind = "table"
+    ...     @staticmethod
+    ...     def distance(x, y, t, px, py, radius):
+    ...         return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - radius
+    >>> zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+    >>> controller = szlib.MPCCBF(zone, obstacles=[Table(0.0, 0.2, 0.6)])
+    >>> step = controller.step((-2.0, 0.0, 0.3, 0.0), (3.0, 0.0))
+    >>> float(step.h[0].round(3)), step.safe, step.obstacles[0].kind
+    (0.86, True, 'table')
+    """
+
+    kind: ClassVar[str] = "obstacle"
+    priority: ClassVar[Priority] = Priority.WALL
+    has_barrier: ClassVar[bool] = True
+    numbers: tuple[float, ...]
+
+    def __init_subclass__(cls) -> None:
+        if "kind" not in cls.__dict__:
+            cls.kind = cls.__name__.lower()
+
+    def __init__(self, *numbers: float) -> None:
+        given = check_array(f"the numbers of a {self.kind}", numbers, (len(numbers),))
+        self.numbers = tuple(given.tolist())
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """Distance of (`x`, `y`) to the obstacle, `t` seconds from now [m]; operators only.
+
+        Parameters
+        ----------
+        x, y : position, floats, arrays or symbols [m].
+        t : time from now [s].
+        numbers : of the obstacle.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """Euclidean distance to what the robot would touch [m]; by default, and for parameters, see
+        `Obstacle.distance`.
+        """
+        return cls.distance(x, y, t, *numbers)
+
+    @classmethod
+    def bound_way(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """A lower bound of the way to the obstacle [m]; by default, and for parameters, see
+        `Obstacle.distance`.
+        """
+        return cls.distance(x, y, t, *numbers)
+
+    def margin(self, settings: MPCSettings) -> float:
+        """Margin that the robot keeps by its `settings` [m]: eps."""
+        return settings.eps
+
+    @classmethod
+    def speeds(cls, numbers: Array) -> Array:
+        """Speeds of obstacles of this kind with these `numbers`, shape (n, m) [m/s]; here 0."""
+        return np.zeros(len(numbers))
+
+    @property
+    def is_fixed(self) -> bool:
+        """True if it belongs to the building: the robot can always stop before it."""
+        return self.priority == Priority.WALL
+
+    def __repr__(self) -> str:
+        return f"{self.kind} ({', '.join(f'{number:g}' for number in self.numbers)})"
+
+
+class Zone(Obstacle):
+    """The social zone of a person, in the world: an ellipse that moves with the person (paper, eq. 7).
+
+    Parameters
+    ----------
+    numbers : the foci (xa, ya, xb, yb), the semi-major axis, the velocity (vx, vy) and the position (x, y) of
+        the person [m, m/s].
+    """
+
+    kind = "person"
+    priority = Priority.ZONE
+
+    @staticmethod
+    def place(
+        zone: Ellipse, position: Point, heading: float, velocity: Point
+    ) -> tuple[float, ...]:
+        """The numbers of a `zone` of a person's frame around a person at this position.
+
+        Parameters
+        ----------
+        zone : in the person's frame.
+        position : (x, y) [m].
+        heading : direction in which the person faces [rad].
+        velocity : (vx, vy) [m/s].
+        """
+        (x, y), c, s = position, cos(heading), sin(heading)
+        ma, na, mb, nb, a = zone.foci_and_axis
+        xa, ya = x + ma * c - na * s, y + ma * s + na * c
+        return xa, ya, x + mb * c - nb * s, y + mb * s + nb * c, a, *velocity, x, y
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """See `Obstacle.distance`: approximate, from the sum of focal distances."""
+        xa, ya, xb, yb, a, vx, vy, *_ = numbers
+        return ellipse_formula(x - t * vx, y - t * vy, xa, ya, xb, yb, a)
+
+    @classmethod
+    def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """Distance to the person's body; parameters as of `Obstacle.distance`."""
+        *_, vx, vy, px, py = numbers
+        return Body.distance(x, y, t, px, py, vx, vy)
+
+    @classmethod
+    def speeds(cls, numbers: Array) -> Array:
+        """See `Obstacle.speeds`; `numbers` as there."""
+        return np.hypot(numbers[:, 5], numbers[:, 6])
+
+
+class Body(Obstacle):
+    """The body of a person, a disc of `BODY_RADIUS`; its `numbers` are (x, y, vx, vy) [m, m/s]."""
+
+    kind = "body"
+    priority = Priority.BODY
+    has_barrier = False
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """See `Obstacle.distance`: Euclidean."""
+        px, py, vx, vy = numbers
+        return ((x - px - t * vx) ** 2 + (y - py - t * vy) ** 2) ** 0.5 - BODY_RADIUS
+
+    def margin(self, settings: MPCSettings) -> float:
+        """The gap that the robot keeps to bodies by its `settings` [m]."""
+        return settings.body_gap
+
+    @classmethod
+    def speeds(cls, numbers: Array) -> Array:
+        """See `Obstacle.speeds`; `numbers` as there."""
+        return np.hypot(numbers[:, 2], numbers[:, 3])
+
+
+class Wall(Obstacle):
+    """A wall: a segment, whose `numbers` are its ends (xa, ya, xb, yb) [m] (paper, eq. 3-5)."""
+
+    kind = "wall"
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """See `Obstacle.distance`: approximate beyond the ends."""
+        return segment_formula(x, y, *numbers)
+
+    @classmethod
+    def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """Euclidean distance to the segment; parameters as of `Obstacle.distance`."""
+        return euclidean_segment_formula(x, y, *numbers)
+
+    @classmethod
+    def bound_way(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """The way s; parameters as of `Obstacle.distance`.
+
+        With d the approximate distance to a wall of length L, s = L/2 (sqrt(1 + 4 d/L) - 1), so that d = F(s)
+        = s + s^2/L. It changes by no more than the robot moves (`szlib.control.differential_drive`).
+        """
+        xa, ya, xb, yb = numbers
+        length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+        d = segment_formula(x, y, *numbers)
+        return length / 2 * ((1 + 4 * d / length) ** 0.5 - 1)
+
+    def margin(self, settings: MPCSettings) -> float:
+        """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""
+        xa, ya, xb, yb = self.numbers
+        is_euclidean = settings.margin == "euclidean"
+        needed = settings.r_robot**2 / hypot(xb - xa, yb - ya) if is_euclidean else 0.0
+        return max(settings.eps, needed)
+
+
+class HalfPlane(Obstacle):
+    """A side on which the robot must not be: beyond the edge of a platform, or the line of a queue.
+
+    Parameters
+    ----------
+    point : (x, y) on the edge [m].
+    normal : (nx, ny), a direction from the edge to the side that is allowed.
+
+    Raises
+    ------
+    SolverError : a number cannot be used, or the direction has no length.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.control import HalfPlane
+    >>> edge = HalfPlane(point=(0.0, -1.0), normal=(0.0, 1.0))  # the rails lie below y = -1
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), obstacles=[edge])
+    >>> controller.step((0.0, 0.0, 0.0, -0.2), (5.0, 0.0)).h.round(2).tolist()
+    [0.45]
+    """
+
+    kind = "half-plane"
+
+    def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
+        x, y = check_array("point", point, (2,)).tolist()
+        nx, ny = check_array("normal", normal, (2,)).tolist()
+        length = hypot(nx, ny)
+        if length == 0:
+            raise SolverError(f"normal must have a direction; got {normal!r}")
+        super().__init__(x, y, nx / length, ny / length)
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """See `Obstacle.distance`: Euclidean."""
+        px, py, nx, ny = numbers
+        return (x - px) * nx + (y - py) * ny
+
+
+# Share of a piece of a path over which the slope of a distance is taken.
+_INSTANT = 1e-3
+
+
+class Path(NamedTuple):
+    """Where the robot goes: nearly straight from point to point.
+
+    Attributes
+    ----------
+    points : shape (k+1, 2) [m].
+    times : from now, shape (k+1,) [s].
+    bows : by which it leaves a uniform motion between two points at most, shape (k,) [m].
+    asides : by which it leaves the straight line between two points at most, shape (k,) [m].
+    """
+
+    points: Array
+    times: Array
+    bows: Array
+    asides: Array
+
+    def joined(self, later: Path) -> Path:
+        """This path, and then a `later` one, which begins where and when this one ends."""
+        return Path(
+            np.concatenate([self.points, later.points[1:]]),
+            np.concatenate([self.times, later.times[1:]]),
+            np.concatenate([self.bows, later.bows]),
+            np.concatenate([self.asides, later.asides]),
+        )
+
+
+class Group(NamedTuple):
+    """Obstacles of one kind, as a table.
+
+    Attributes
+    ----------
+    kind : their class, derived from `Obstacle`.
+    numbers : of each, shape (n, m).
+    offsets : r_robot + margin of each, shape (n,) [m].
+    """
+
+    kind: Any
+    numbers: Array
+    offsets: Array
+
+
+class Obstacles(NamedTuple):
+    """Obstacles in an order, so that h of all of them is one computation for each kind.
+
+    Attributes
+    ----------
+    groups : the obstacles: all of one kind, then all of another.
+    r_robot : radius of the robot [m].
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.control import HalfPlane, Obstacles
+    >>> obstacles = Obstacles.of([HalfPlane((0.0, 0.0), (0.0, 1.0))], szlib.MPCSettings())
+    >>> obstacles.h(0.0, 2.0).round(3).tolist()
+    [1.45]
+    """
+
+    groups: tuple[Group, ...]
+    r_robot: float
+
+    @classmethod
+    def of(cls, items: Iterable[Obstacle], settings: MPCSettings) -> Obstacles:
+        """The obstacles `items` of a robot with these `settings`."""
+        groups = list[Group]()
+        for kind, of_kind in groupby(items, type):
+            chosen = list(of_kind)
+            numbers = np.array([each.numbers for each in chosen], float)
+            offsets = [settings.r_robot + each.margin(settings) for each in chosen]
+            groups.append(Group(kind, numbers, np.array(offsets)))
+        return cls(tuple(groups), settings.r_robot)
+
+    def chosen(self, rows: Sequence[int]) -> Obstacles:
+        """Those of one kind at these `rows`."""
+        if len(rows) == self.size:
+            return self
+        (kind, numbers, offsets), r_robot = self.groups[0], self.r_robot
+        chosen = Group(kind, numbers[rows], offsets[rows])
+        return Obstacles((chosen,) if rows else (), r_robot)
+
+    def joined(self, others: Obstacles) -> Obstacles:
+        """These, and then the `others`."""
+        return Obstacles(self.groups + others.groups, self.r_robot)
+
+    @property
+    def size(self) -> int:
+        """Number of obstacles."""
+        return sum(len(group.offsets) for group in self.groups)
+
+    @property
+    def items(self) -> tuple[Obstacle, ...]:
+        """The obstacles one by one."""
+        return tuple(
+            rebuild(group.kind, numbers)
+            for group in self.groups
+            for numbers in group.numbers.tolist()
+        )
+
+    def h(self, x: Any, y: Any, t: Any = 0.0) -> Array:
+        """h of each obstacle for a robot at (`x`, `y`), `t` seconds from now, shape (n, ...) [m].
+
+        Parameters
+        ----------
+        x, y : position, numbers or arrays of one shape [m].
+        t : time from now, a number or an array of this shape [s].
+        """
+        return self._collect("distance", x, y, t, is_barrier=True)
+
+    def gaps(self, x: Any, y: Any, t: Any = 0.0) -> Array:
+        """Euclidean gaps of the robot's disc, shape (n, ...) [m]; `x`, `y` and `t` as of `h`."""
+        return self._collect("gap", x, y, t) - self.r_robot
+
+    def bound(
+        self, path: Path, *, is_barrier: bool = False, are_fixed: bool = False
+    ) -> tuple[Array, Array]:
+        """Lower bounds of the gaps on a path, and the least gaps at its points but the first, shape (n,) [m].
+
+        Parameters
+        ----------
+        path : of the robot.
+        is_barrier : True: of h instead of the gap; not of walls, whose h may change faster than the robot
+            moves.
+        are_fixed : True: the obstacles stand still, so that only the line matters, not the time.
+
+        Notes
+        -----
+        If the robot moved straight at a constant velocity between two points, as obstacles do, these
+        distances would be convex functions of time. Such a function lies above its tangents at both ends, so
+        nowhere below the point where they cross. The robot leaves that motion by at most the bow.
+        """
+        if not self.groups:
+            return np.zeros(0), np.zeros(0)
+        start, end = path.points[:-1], path.points[1:]
+        way, lasts = end - start, np.diff(path.times)
+        at_points = self._measure(path.points, path.times, is_barrier)
+        first, last = at_points[:, :-1], at_points[:, 1:]
+        seen = at_points[:, 1:].min(axis=1, initial=np.inf)
+        bows = path.asides if are_fixed else path.bows
+        speeds = np.concatenate(
+            [kind.speeds(numbers) for kind, numbers, _ in self.groups]
+        )
+        reach = np.hypot(*way.T) + speeds[:, None] * lasts
+        # no distance changes by more than the way
+        lower = (first + last - reach) / 2 - bows
+        if lower.min(initial=np.inf) >= 0:
+            return lower.min(axis=1, initial=np.inf), seen
+        begin, shares = path.times[:-1], (_INSTANT, 1 - _INSTANT)
+        after, before = (
+            self._measure(start + share * way, begin + share * lasts, is_barrier)
+            for share in shares
+        )
+        falls, rises = (after - first) / _INSTANT, (last - before) / _INSTANT
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = first + falls * (last - rises - first) / (falls - rises)
+        ends = np.minimum(first, last)
+        is_dip = (falls < 0) & (rises > 0)
+        lower = np.where(is_dip, np.minimum(crossing, ends) - _INSTANT * reach, ends)
+        return (lower - bows).min(axis=1, initial=np.inf), seen
+
+    def _measure(self, points: Array, times: Array, is_barrier: bool) -> Array:
+        measure = self.h if is_barrier else self.gaps
+        return measure(points[:, 0], points[:, 1], times)
+
+    def find_near(self, x: float, y: float, reach: float) -> list[int]:
+        """Places of the obstacles that are at most `reach` [m] away from (`x`, `y`) [m].
+
+        An obstacle with the velocity w can be left out while its way s >= r_robot + margin + (v + w) (T +
+        dt/gamma), with the horizon T, and dt and gamma of the longest step: then its rows hold whatever a
+        robot does that is no faster than v. For a wall (`Wall.bound_way`), with S = r_robot + eps, and
+        r_robot + margin <= F(S),
+
+            gamma h(x_k) >= gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
+                         >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
+
+        A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m.
+        """
+        return np.flatnonzero(self._collect("bound_way", x, y, 0.0) <= reach).tolist()
+
+    def _collect(
+        self, formula: str, x: Any, y: Any, t: Any, *, is_barrier: bool = False
+    ) -> Array:
+        """The `formula` of each obstacle, shape (n, ...); of a barrier less its offset."""
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(t))
+        found, axes = np.empty((self.size, *shape)), (...,) + (None,) * len(shape)
+        begin = 0
+        for kind, numbers, offsets in self.groups:
+            values = getattr(kind, formula)(x, y, t, *numbers.T[axes])
+            end = begin + len(offsets)
+            found[begin:end] = values - offsets[axes] if is_barrier else values
+            begin = end
+        return found
+
+
+def find_bodies(zones: Obstacles, settings: MPCSettings) -> Obstacles:
+    """The bodies of the people who have these `zones`, for a robot with these `settings`."""
+    if not zones.groups:
+        return zones
+    numbers = zones.groups[0].numbers[:, [7, 8, 5, 6]]
+    offsets = np.full(len(numbers), settings.r_robot + settings.body_gap)
+    return Obstacles((Group(Body, numbers, offsets),), settings.r_robot)
+
+
+def rebuild(kind: type[Obstacle], numbers: Sequence[float]) -> Obstacle:
+    """An obstacle of this `kind` from its `numbers`, whatever arguments its class takes."""
+    obstacle = kind.__new__(kind)
+    obstacle.numbers = tuple(numbers)
+    return obstacle
+
+
+def number_kinds(obstacles: Iterable[Obstacle]) -> list[str]:
+    """A name for each of the `obstacles`: its kind, and its number among those of this kind."""
+    counts, names = Counter[str](), list[str]()
+    for each in obstacles:
+        names.append(f"{each.kind}_{counts[each.kind]}")
+        counts[each.kind] += 1
+    return names
+
+
+def describe(obstacle: Obstacle) -> dict[str, Any]:
+    """An `obstacle` as its kind and numbers, for a file; `restore` reads it."""
+    return {"kind": obstacle.kind, "numbers": list(obstacle.numbers)}
+
+
+def restore(content: dict[str, Any]) -> Obstacle:
+    """The obstacle that `describe` wrote as `content`; SolverError if no class has its kind."""
+    kinds, found = [Obstacle], list[type[Obstacle]]()
+    while kinds:
+        kinds += (kind := kinds.pop()).__subclasses__()
+        found.append(kind)
+    for kind in found:
+        if kind.kind == content["kind"]:
+            return rebuild(kind, content["numbers"])
+    raise SolverError(
+        f"no class of obstacles has the kind {content['kind']!r}; define it before the file is read"
+    )

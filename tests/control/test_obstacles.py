@@ -1,0 +1,493 @@
+"""Distances against an independent geometry, bounds on paths, and every kind of obstacle in use."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Sequence
+from pathlib import Path as File
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import szlib
+from szlib.control import HalfPlane, Obstacle, Obstacles, Wall, Zone
+from szlib.control.controller import advance, find_stopping_path
+from szlib.control.obstacles import (
+    Body,
+    Path,
+    barrier,
+    cbf_residual,
+    describe,
+    ellipse_formula,
+    number_kinds,
+    restore,
+    segment_formula,
+)
+from szlib.zones.ellipses import BODY_RADIUS
+
+coordinate = st.floats(-5, 5)
+point = st.tuples(coordinate, coordinate)
+ZONE = szlib.Ellipse((0.3, -0.2), (1.0, 0.7), 0.4)
+S = szlib.MPCSettings(time_limit=np.inf)
+
+
+def identify(obstacles):
+    """What makes obstacles the same: their kinds and numbers."""
+    return [(type(each), each.numbers) for each in obstacles]
+
+
+def far_apart(a, b):
+    return np.hypot(a[0] - b[0], a[1] - b[1]) > 0.1
+
+
+@settings(derandomize=True, max_examples=200)
+@given(point, point, st.floats(0, 1))
+def test_a_segment_is_at_distance_zero_from_itself(a, b, share):
+    if far_apart(a, b):
+        on = (1 - share) * np.array(a) + share * np.array(b)
+        assert szlib.segment_distance(on, a, b) == pytest.approx(0, abs=1e-12)
+
+
+@settings(derandomize=True, max_examples=200)
+@given(point, point, point)
+def test_off_the_segment_the_distance_is_positive_and_euclidean_within_its_disc(
+    p, a, b
+):
+    if not far_apart(a, b):
+        return
+    true = shapely.distance(shapely.Point(p), shapely.LineString([a, b]))
+    found = szlib.segment_distance(p, a, b)
+    if true > 1e-6:
+        assert found > 0
+    radius = np.hypot(a[0] - b[0], a[1] - b[1]) / 2
+    if np.hypot(p[0] - (a[0] + b[0]) / 2, p[1] - (a[1] + b[1]) / 2) <= radius:
+        line = shapely.LineString([2 * np.array(a) - b, 2 * np.array(b) - a])
+        assert found == pytest.approx(true, abs=1e-9)
+        assert found == pytest.approx(
+            shapely.distance(shapely.Point(p), line), abs=1e-9
+        )
+
+
+def test_beyond_its_end_the_distance_is_euclidean_to_first_order():
+    gaps = np.array([1e-2, 1e-3, 1e-4])
+    found = szlib.segment_distance(np.c_[3 + gaps, 0 * gaps], (0, 0), (3, 0))
+    assert np.abs(found - gaps) == pytest.approx(gaps**2 / 3, rel=1e-6)
+
+
+@settings(derandomize=True, max_examples=100)
+@given(point, point, point, st.floats(-np.pi, np.pi), point)
+def test_moving_and_turning_everything_or_swapping_the_ends_changes_nothing(
+    p, a, b, angle, shift
+):
+    if not far_apart(a, b):
+        return
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    moved = [turn @ q + shift for q in (p, a, b)]
+    here = szlib.segment_distance(p, a, b)
+    assert szlib.segment_distance(*moved) == pytest.approx(here, abs=1e-6, rel=1e-9)
+    assert szlib.segment_distance(p, b, a) == pytest.approx(here, abs=1e-9)
+    here = szlib.ellipse_distance(p, ZONE)
+    assert szlib.ellipse_distance(
+        turn @ p + shift, ZONE.placed(shift, angle)
+    ) == pytest.approx(here, abs=1e-9)
+
+
+def test_the_ellipse_is_its_own_zero_level_and_divides_the_plane():
+    assert szlib.ellipse_distance(ZONE.curve(100), ZONE) == pytest.approx(0, abs=1e-12)
+    points = np.random.default_rng(0).uniform(-3, 3, (1000, 2))
+    inside = shapely.contains_xy(shapely.Polygon(ZONE.curve(20_000)), points)
+    assert ((szlib.ellipse_distance(points, ZONE) < 0) == inside).all()
+
+
+def test_the_distance_to_a_circle_is_euclidean():
+    circle = szlib.Ellipse((1.0, 2.0), (0.8, 0.8))
+    points = np.random.default_rng(1).uniform(-3, 5, (200, 2))
+    assert szlib.ellipse_distance(points, circle) == pytest.approx(
+        np.hypot(*(points - (1, 2)).T) - 0.8
+    )
+
+
+@pytest.mark.parametrize(
+    ("formula", "numbers"),
+    [
+        (segment_formula, (-1.0, 0.5, 2.0, 1.5)),
+        (ellipse_formula, (-0.6, 0.1, 0.7, -0.2, 0.9)),
+    ],
+)
+def test_numbers_and_symbols_agree_and_so_do_the_gradients(formula, numbers):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    expression = formula(x, y, *numbers)
+    both = ca.Function(
+        "both", [x, y], [expression, ca.jacobian(expression, ca.vertcat(x, y))]
+    )
+    for px, py in np.random.default_rng(2).uniform(-4, 4, (50, 2)):
+        value, gradient = (np.asarray(part).ravel() for part in both(px, py))
+        assert value == pytest.approx(formula(px, py, *numbers), rel=1e-12)
+        e = 1e-6
+        numeric = [
+            (formula(px + e, py, *numbers) - formula(px - e, py, *numbers)) / (2 * e),
+            (formula(px, py + e, *numbers) - formula(px, py - e, *numbers)) / (2 * e),
+        ]
+        assert gradient == pytest.approx(numeric, abs=1e-7)
+
+
+def test_distances_have_the_shape_of_the_points():
+    assert szlib.segment_distance(np.zeros((4, 3, 2)), (0, 1), (1, 1)).shape == (4, 3)
+    assert szlib.ellipse_distance((0, 0), ZONE).shape == ()
+
+
+def test_the_condition_allows_h_to_fall_by_the_fraction_gamma_only():
+    h = barrier(2.0, 0.5, 0.05)
+    assert h == pytest.approx(1.45)
+    assert cbf_residual((1 - 0.05) * h, h, 0.05) == pytest.approx(0)
+    assert cbf_residual(0.9 * h, h, 0.05) < 0 < cbf_residual(0.96 * h, h, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (((0, 0), (1, 2), (1, 2)), r"two different end points; got \[1.0, 2.0\]"),
+        (((0, np.nan), (0, 0), (1, 0)), "points must be finite"),
+        (((0, 0), (0, 0), (np.inf, 0)), "wall must be finite"),
+        (((0, 0, 0), (0, 0), (1, 0)), r"points must have shape .* got \(3,\)"),
+        ((("a", "b"), (0, 0), (1, 0)), "points must be numbers"),
+    ],
+)
+def test_points_and_walls_that_cannot_be_used_raise_an_error(arguments, message):
+    with pytest.raises(szlib.SolverError, match=message):
+        szlib.segment_distance(*arguments)
+
+
+# --- kinds of obstacles ------------------------------------------------------------------------------
+
+
+class Table(Obstacle):
+    """A round table, as a user would write it: (x, y, radius) [m]."""
+
+    kind = "table"
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        px, py, radius = numbers
+        return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - radius
+
+
+def some_of_each(rng: np.random.Generator) -> list[Obstacle]:
+    """Obstacles of every kind, sorted by kind."""
+    zone = szlib.Ellipse((0.1, 0.05), (0.9, 0.6), rng.uniform(-3, 3))
+    velocities = [tuple(v) for v in rng.uniform(-2, 2, (2, 2)).tolist()]
+    places = [tuple(p) for p in rng.uniform(-3, 3, (2, 2)).tolist()]
+    zones = [
+        Zone(*Zone.place(zone, p, rng.uniform(-3, 3), v))
+        for p, v in zip(places, velocities, strict=True)
+    ]
+    return [
+        *zones,
+        *(Body(*p, *v) for p, v in zip(places, velocities, strict=True)),
+        *(Wall(*ends) for ends in rng.uniform(-3, 3, (3, 4)).tolist()),
+        HalfPlane(rng.uniform(-3, 3, 2), rng.normal(size=2)),
+        Table(*rng.uniform(-3, 3, 2).tolist(), 0.6),
+    ]
+
+
+def test_h_of_a_table_of_obstacles_is_that_of_each_obstacle():
+    rng = np.random.default_rng(3)
+    items = some_of_each(rng)
+    table, (x, y) = Obstacles.of(items, S), rng.uniform(-4, 4, (2, 5, 6))
+    t = rng.uniform(0, 2, (5, 6))
+    assert identify(table.items) == identify(items) and table.size == len(items)
+    h, gaps = table.h(x, y, t), table.gaps(x, y, t)
+    assert h.shape == gaps.shape == (len(items), 5, 6)
+    for each, own_h, own_gap in zip(items, h, gaps, strict=True):
+        offset = S.r_robot + each.margin(S)
+        assert own_h == pytest.approx(each.distance(x, y, t, *each.numbers) - offset)
+        assert own_gap == pytest.approx(each.gap(x, y, t, *each.numbers) - S.r_robot)
+    assert table.h(0.3, 0.4).shape == (len(items),)
+    assert Obstacles((), S.r_robot).h(x, y, t).shape == (0, 5, 6)
+    walls = Obstacles.of(items[4:7], S)
+    assert identify(walls.chosen([2, 0]).items) == identify([items[6], items[4]])
+    both = Obstacles.of(items[:2], S).joined(walls)
+    assert identify(both.items) == identify([*items[:2], *items[4:7]])
+
+
+def test_each_kind_has_one_formula_for_numbers_and_symbols():
+    rng, symbols = np.random.default_rng(4), ca.SX.sym("xyt", 3)
+    for each in some_of_each(rng):
+        for formula in (each.distance, each.gap, each.bound_way):
+            value = ca.Function(
+                "f", [symbols], [formula(*ca.vertsplit(symbols), *each.numbers)]
+            )
+            for point in rng.uniform(-4, 4, (10, 3)):
+                expected = formula(*point.tolist(), *each.numbers)
+                assert float(value(point)) == pytest.approx(expected, rel=1e-11)
+
+
+def test_no_distance_changes_by_more_than_the_robot_and_the_obstacle_move():
+    """As `Obstacle` requires of `gap` and of `bound_way`, from which ways are bounded."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        for each in some_of_each(rng):
+            (speed,) = each.speeds(np.array([each.numbers]))
+            p, t = rng.uniform(-4, 4, (50, 2)), rng.uniform(0, 2, 50)
+            q, later = p + rng.normal(0, 0.2, (50, 2)), t + rng.uniform(0, 0.3, 50)
+            moved = np.hypot(*(q - p).T) + speed * (later - t)
+            for formula in (each.gap, each.bound_way):
+                change = formula(*q.T, later, *each.numbers) - formula(
+                    *p.T, t, *each.numbers
+                )
+                assert (np.abs(change) <= moved + 1e-9).all(), each
+
+
+def test_a_zone_in_the_world_is_the_zone_placed_at_its_person():
+    rng, person = np.random.default_rng(6), szlib.Person((1.0, -2.0), (0.4, 0.3))
+    numbers = Zone.place(ZONE, person.position, person.heading, person.velocity)
+    for t in (0.0, 1.5):
+        points = rng.uniform(-4, 4, (40, 2))
+        placed = ZONE.placed(person.after(t).position, person.heading)
+        expected = szlib.ellipse_distance(points, placed)
+        assert Zone.distance(*points.T, t, *numbers) == pytest.approx(expected)
+        gaps = np.hypot(*(points - person.after(t).position).T) - BODY_RADIUS
+        assert Zone.gap(*points.T, t, *numbers) == pytest.approx(gaps)
+
+
+@pytest.mark.parametrize("length", [0.001, 0.1, 0.5, 1.0, 5.0, 12.0])
+def test_the_margin_of_a_wall_is_what_it_requires_and_never_less_than_eps(length):
+    wall, paper = Wall(0.0, 0.0, length, 0.0), szlib.MPCSettings(margin="paper")
+    assert wall.margin(S) == max(0.05, 0.25 / length)
+    assert wall.margin(paper) == 0.05
+    table = Obstacles.of([wall], S)
+    for touching in ((length + 0.5, 0.0), (-0.3, 0.4), (length + 0.3, -0.4)):
+        assert table.h(*touching)[0] <= 1e-9
+    beside = (length / 2, 0.5 * (1 + 0.42) + 0.05)
+    assert table.h(*beside)[0] >= 0, "no more than 0.42 r of room is given away"
+
+
+# --- bounds on a path --------------------------------------------------------------------------------
+
+
+def braking_paths(seed: int, n: int) -> list[tuple[Path, Any]]:
+    """Paths of a robot that holds a control and then brakes, and its positions at many times."""
+    rng, found = np.random.default_rng(seed), list[Any]()
+    for _ in range(n):
+        state = np.r_[rng.uniform(-2, 2, 2), rng.uniform(-1.5, 1.5, 2)]
+        control = rng.uniform(-1, 1, 2)
+        path = find_stopping_path(state.tolist(), control, S)
+
+        def move(t, state=state, control=control):
+            """Where the robot is at a time: it brakes in steps of dt, the last one as far as needed."""
+            while t > S.dt:
+                state, t = advance(state, control, S.dt), t - S.dt
+                lasts = max(S.dt, np.abs(state[2:]).max() / S.a_max)
+                control = -state[2:] / lasts
+            return advance(state, control, t)[:2]
+
+        found.append((path, move))
+    return found
+
+
+def test_the_stopping_path_passes_where_the_robot_is():
+    for path, move in braking_paths(7, 30):
+        for k, (point, time) in enumerate(zip(path.points, path.times, strict=True)):
+            assert move(time) == pytest.approx(point, abs=1e-9), k
+        lines = shapely.LineString(path.points)
+        for k, bow in enumerate(path.bows):
+            t = np.linspace(path.times[k], path.times[k + 1], 11)
+            at = np.array([move(each) for each in t])
+            straight = np.linspace(path.points[k], path.points[k + 1], 11)
+            assert np.hypot(*(at - straight).T).max() <= bow + 1e-9
+            aside = max(lines.distance(shapely.Point(p)) for p in at)
+            assert aside <= path.asides.max() + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("is_barrier", "are_fixed"), [(False, False), (True, False), (False, True)]
+)
+def test_the_bound_of_a_path_is_below_every_gap_on_it_and_not_far_below(
+    is_barrier, are_fixed
+):
+    rng, slack = np.random.default_rng(8), list[float]()
+    for path, move in braking_paths(9, 60):
+        items = some_of_each(rng)
+        # h of walls beyond their ends changes by more than the robot moves
+        some = items[4:] if are_fixed else items[:2] if is_barrier else items
+        table = Obstacles.of(some, S)
+        bound, seen = table.bound(path, is_barrier=is_barrier, are_fixed=are_fixed)
+        t = np.linspace(0, path.times[-1], 801)
+        x, y = np.array([move(each) for each in t]).T
+        true = table.h(x, y, t) if is_barrier else table.gaps(x, y, t)
+        assert (bound <= true.min(axis=1) + 1e-9).all()
+        measure = table.h if is_barrier else table.gaps
+        at_points = measure(*path.points.T, path.times)
+        assert (seen >= at_points.min(axis=1) - 1e-9).all()
+        assert (seen <= at_points[:, 1:].min(axis=1) + 1e-9).all()
+        near = true.min(axis=1) < 0.5
+        slack += (true.min(axis=1) - bound)[near & (bound < 0)].tolist()
+    assert len(slack) > 30 and np.median(slack) < 0.01
+
+
+def test_a_path_among_no_obstacles_has_no_bounds():
+    path = find_stopping_path((0.0, 0.0, 1.0, 0.0), np.zeros(2), S)
+    assert [each.shape for each in Obstacles((), 0.5).bound(path)] == [(0,), (0,)]
+
+
+# --- a half-plane, and an obstacle of a user ---------------------------------------------------------
+
+EDGE = HalfPlane(point=(0.0, -1.0), normal=(0.0, 2.0))
+NEAR_EDGE = HalfPlane(point=(0.0, -0.7), normal=(0.0, 1.0))
+
+
+@settings(derandomize=True, max_examples=100)
+@given(point, point, st.floats(-np.pi, np.pi))
+def test_h_of_a_half_plane_is_the_signed_distance_to_its_edge(p, on, angle):
+    normal = np.array([np.cos(angle), np.sin(angle)])
+    edge = HalfPlane(on, 3.0 * normal)
+    along = 100 * np.array([-normal[1], normal[0]])
+    line = shapely.LineString([np.array(on) - along, np.array(on) + along])
+    distance = line.distance(shapely.Point(p))
+    side = np.sign((np.array(p) - on) @ normal)
+    found = Obstacles.of([edge], S)
+    assert found.h(*p)[0] == pytest.approx(side * distance - 0.55, abs=1e-9)
+    assert found.gaps(*p)[0] == pytest.approx(side * distance - 0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("point", "normal"),
+    [((0, 0), (0, 0)), ((0, np.nan), (0, 1)), ((0, 0, 0), (0, 1)), ((0, 0), "up")],
+)
+def test_a_half_plane_without_a_direction_is_refused(point, normal):
+    with pytest.raises(szlib.SolverError, match=r"normal must|point must"):
+        HalfPlane(point, normal)
+
+
+def drive_of(kind: Any, obstacles: Sequence[Obstacle], **changes: Any) -> Any:
+    chosen = szlib.MPCSettings.among_people if changes.pop("people", 0) else None
+    made = (chosen or szlib.MPCSettings)(**{"time_limit": np.inf} | changes)
+    return kind(ZONE, obstacles=obstacles, settings=made)
+
+
+CONTROLLERS = {
+    "default": lambda obstacles: drive_of(szlib.MPCCBF, obstacles),
+    "among people": lambda obstacles: drive_of(szlib.MPCCBF, obstacles, people=1),
+    "two wheels": lambda obstacles: drive_of(
+        szlib.DifferentialDrive, obstacles, r_robot=0.3
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", CONTROLLERS)
+def test_no_robot_crosses_a_half_plane_whoever_comes(kind):
+    """Its goal lies beyond the edge, and then two people walk towards it."""
+    controller = CONTROLLERS[kind]([EDGE])
+    own = controller.robot.start(np.array([-2.0, 1.0, 0.6, -0.6]))
+    radius, lowest = controller.settings.r_robot, np.inf
+    people = np.array([[0.0, 3.0, 0.0, -1.2], [3.0, 3.0, -0.5, -1.1]])
+    for k in range(90):
+        seen = people if k > 40 else people[:0]
+        step = controller.step(own, (1.0, -3.0), seen)
+        assert step.walls_safe and step.verify().ok, step.explain()
+        own = controller.robot.advance(own, step.control, 0.1)
+        y = controller.robot.body(own)[1]
+        lowest = min(lowest, y + 1.0 - radius)
+        people[:, :2] += 0.1 * people[:, 2:] * (k > 40)
+    assert 0.0 <= lowest < 0.6
+
+
+def test_a_step_names_a_half_plane():
+    controller = drive_of(szlib.MPCCBF, [EDGE, HalfPlane((9.0, 0.0), (-1.0, 0.0))])
+    step = controller.step((0.0, -0.2, 0.0, 0.0), (0.0, -5.0), [[2.0, 3.0, 0.0, 0.0]])
+    assert [each.kind for each in step.obstacles] == ["person", "half-plane", "half-plane"]  # fmt: skip
+    assert step.scene.name(1) == "half-plane 0 (0, -1, 0, 1)"
+    assert step.scene.name(2).startswith("half-plane 1 (9, 0, -1")
+    assert "nearest is half-plane 0 (0, -1, 0, 1)" in step.explain()
+    assert step.goal_blocked and "cannot be reached" in step.explain()
+    with pytest.raises(szlib.SolverError, match="too close to half-plane 0"):
+        controller.check_start((0.0, 0.0, 0.0, 0.0), (0.0, -5.0))
+    assert repr(EDGE) == "half-plane (0, -1, 0, 1)"
+
+
+@pytest.mark.parametrize("obstacle", [NEAR_EDGE, Table(0.0, -0.3, 0.7)], ids=["edge", "table"])  # fmt: skip
+@pytest.mark.parametrize("kind", CONTROLLERS)
+def test_an_obstacle_goes_through_run_log_and_figures(obstacle, kind, tmp_path: File):
+    """A half-plane, and a kind that szlib does not know: only the class is written."""
+    import matplotlib.pyplot as plt
+
+    from szlib.workbook import figures
+
+    walls, person = [((-6.0, 2.5), (6.0, 2.5))], szlib.Person((5.0, 0.8), (-0.6, 0.1))
+    scenario = szlib.Scenario(
+        "hall", (-3.0, 0.2, 0, 0), (3.0, 0.2), (person,), walls, obstacles=[obstacle]
+    )
+    controller = CONTROLLERS[kind]([obstacle])
+    controller.set_walls(walls)
+    log = szlib.simulate(scenario, controller, max_time=6.0)
+    if obstacle is NEAR_EDGE:
+        expected = log.states[:, 1] + 0.7
+    else:
+        expected = np.hypot(*(log.states[:, :2] - (0.0, -0.3)).T) - 0.7
+    radius = log.settings.r_robot
+    assert log.clearance[:, 2] == pytest.approx(expected - radius)
+    assert log.h[:, 2] == pytest.approx(expected - radius - 0.05)
+    assert log.clearance[:, 1:].min() >= 0
+    assert log.table[f"h_{obstacle.kind}_0"].to_numpy() == pytest.approx(log.h[:, 2])
+    metrics = log.metrics()
+    assert metrics["unflagged_violations"] == metrics["unflagged_overlaps"] == 0
+
+    log.save(tmp_path / "run")
+    loaded = szlib.SimulationLog.load(tmp_path / "run")
+    assert identify(loaded.scenario.obstacles) == identify([obstacle])
+    assert np.array_equal(loaded.h, log.h) and loaded.metrics() == metrics
+
+    ax = log.plot()
+    assert obstacle.kind in [text.get_text() for text in ax.get_legend().get_texts()]
+    figures.plot_barriers(log)
+    step = controller.step(log.states[-1] if kind != "two wheels" else [0, 0.9, 0], (3.0, 0.2))  # fmt: skip
+    point = getattr(step, "point", step)
+    figures.plot_step(point)
+    figures.plot_admissible_controls(point)
+    plt.close("all")
+    assert step.verify().ok and point.scene.name(1).startswith(f"{obstacle.kind} 0 (")
+
+
+def test_a_table_is_avoided_by_either_solver_and_by_copies():
+    table = Table(0.0, 0.2, 0.6)
+    question = (-2.0, 0.0, 0.3, 0.0), (4.0, 0.0)
+    sqp, ipopt = (
+        drive_of(szlib.MPCCBF, [table], solver=solver, N_h=8)
+        for solver in ("sqp", "ipopt")
+    )
+    step = sqp.step(*question)
+    assert step.residual.min() == pytest.approx(0, abs=1e-5), (
+        "the table bounds the plan"
+    )
+    assert ipopt.step(*question).control == pytest.approx(step.control, abs=1e-3)
+    for again in (copy.deepcopy(sqp), pickle.loads(pickle.dumps(sqp))):
+        sqp.reset()
+        again.reset()
+        assert np.array_equal(
+            again.step(*question).control, sqp.step(*question).control
+        )
+
+
+def test_something_that_is_no_obstacle_is_refused():
+    for wrong in ("table", (0.0, 0.0, 1.0), Wall):
+        with pytest.raises(szlib.SolverError, match="an obstacle must be an Obstacle"):
+            szlib.MPCCBF(ZONE, obstacles=[wrong])
+    with pytest.raises(szlib.SolverError, match=r"numbers of a table must be finite"):
+        szlib.MPCCBF(ZONE, obstacles=[Table(0.0, np.nan, 1.0)])
+
+
+def test_an_obstacle_is_restored_from_its_kind_and_numbers():
+    for each in some_of_each(np.random.default_rng(10)):
+        assert identify([restore(describe(each))]) == identify([each])
+    with pytest.raises(
+        szlib.SolverError, match="no class of obstacles has the kind 'sofa'"
+    ):
+        restore({"kind": "sofa", "numbers": [1.0]})
+    names = number_kinds([Wall(0, 0, 1, 0), EDGE, Wall(0, 1, 1, 1)])
+    assert names == ["wall_0", "half-plane_0", "wall_1"]
