@@ -62,7 +62,8 @@ parameters(
         ("paper: N, N_h", f"{paper.N}, {paper.N_h}", PAPER, "0.8 s ahead; gamma = 0.05: chapter 09"),
         ("among people: plan", f"{among.times[-1]:g} s", TUNED, f"{among.N} steps, a barrier on each"),
         ("among people: gamma", among.gamma, TUNED, "halved and doubled in notebook 29"),
-        ("decay_price, body_gap", f"{among.decay_price:g}, {among.body_gap:g} m", TUNED, "see notebook 29"),
+        ("decay_price, zone_price", f"{among.decay_price:g}, {among.zone_price:g}", TUNED, "see notebook 29"),
+        ("body_gap", f"{among.body_gap:g} m", TUNED, "see notebook 29"),
     ]
 )
 
@@ -75,12 +76,12 @@ y = side * (np.where(side < 0, 1.5, 2.5) + 4 * row) + rng.uniform(-0.4, 0.4, 8)
 crowd = tuple(szlib.Person((x[i], y[i]), (0.0, -pace * side[i])) for i in range(8))
 
 
-def drive_both(goal, people=(), walls=(), speed=0.0, title="A meeting"):
-    """The run with each of the settings, of a robot that starts at the origin."""
+def drive_both(goal, people=(), walls=(), speed=0.0, title="A meeting", others=()):
+    """The run with each of the settings, and with `others`, of a robot that starts at the origin."""
     walls = np.reshape(walls, (-1, 2, 2)).astype(float)
     start = np.array([0.0, 0, speed, 0])
     scene = Scenario("scene", start, np.array(goal), people, walls, title=title, duration=40.0)
-    each = {"paper": paper, "among people": among}
+    each = {"paper": paper, "among people": among, **dict(others)}
     robots = {name: szlib.MPCCBF(zone, walls=walls, settings=settings) for name, settings in each.items()}
     return {name: drive(scene, robot, until_arrival=True) for name, robot in robots.items()}
 
@@ -187,8 +188,8 @@ print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of mar
 # |---|---|---|---|
 # | 1, walls | the robot can still stop before every wall | by priority | by priority |
 # | 2, bodies | a gap to the bodies of people | 0 m, by priority | 0.2 m, by priority |
-# | 3, zones | $h \ge 0$ | by priority | follows from the price of decay |
-# | 4, decay | eq. 1 (how fast $h$ may fall) | by priority | has a price |
+# | 3, zones | $h \ge 0$ | by priority | has a high price |
+# | 4, decay | eq. 1 (how fast $h$ may fall) | by priority | has a low price |
 #
 # *By priority*: every plan obeys the condition if it can. If it cannot, the condition is violated as little as those above it
 # allow. A *price* is different. It replaces eq. 1 by a condition with a *slack* $s_k \ge 0$:
@@ -196,19 +197,21 @@ print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of mar
 # $$h_{k+1} \ge (1-\gamma)\, h_k - s_k, \qquad \text{cost} + p \sum_k s_k$$
 #
 # - $s_k$ is what is missing in step $k$ [m].
-# - $p$ is the price of a metre that is missing (`decay_price`). With a high price the slack is 0 wherever that is possible (an
+# - $p$ is the price of a metre that is missing (`decay_price`; for $h < 0$ of a zone `zone_price`). With a high price the slack is 0 wherever that is possible (an
 #   *exact penalty*). With a low price the robot buys a short cut through a zone.
 #
 # Bodies and walls cannot be bought, for any number of people.
 #
-# **What do you think?** The five people walk at 1 m/s towards both robots. What does the robot with hard barriers
-# do?
+# **What do you think?** The five people walk at 1 m/s towards three robots: the paper's, `among_people()` with its
+# `zone_price` of 400, and the same with a `zone_price` of 40. Which of them passes?
 
 # %% jupyter={"source_hidden": true}
 # Figure
 front = tuple(szlib.Person((7.0, y), (-1.0, 0.0)) for y in (-4.4, -2.2, 0.0, 2.2, 4.4))
-fronts = drive_both((8.0, 0.0), front, title="Five people side by side")
-fig, panels = plt.subplots(2, 1, figsize=(10, 6.4), layout="constrained", sharex=True, sharey=True)
+cheap = "zone_price 40"
+others = {cheap: replace(among, zone_price=40.0)}
+fronts = drive_both((8.0, 0.0), front, title="Five people side by side", others=others)
+fig, panels = plt.subplots(3, 1, figsize=(10, 9.2), layout="constrained", sharex=True, sharey=True)
 for ax, (name, log) in zip(panels, fronts.items(), strict=True):
     figures.plot_crowd(log, ax=ax).set(xlim=(-16, 10), ylim=(-5.5, 5.5))
     arrived, back = log.metrics()["time_to_goal"], log.states[:, 0].min()
@@ -220,23 +223,25 @@ record.figure(fig, "front")
 
 # %% jupyter={"source_hidden": true}
 # Checks, and the answer
-through, backs = fronts["among people"].metrics(), -fronts["paper"].states[:, 0].min()
+through, backs = fronts[cheap].metrics(), -fronts["among people"].states[:, 0].min()
 wide, entered = through["min_clearance"], through["violations"]
-what = "among people: the robot passes through the front, and keeps 0.2 m"
+what = "the robot with the high price of a zone backs away, as the paper's does"
+record.check(what, backs > 10 and not fronts["paper"].success, f"{backs:.0f} m")
+what = "the robot with the low price passes through the front, and keeps 0.2 m"
 record.check(what, through["success"] and wide >= among.body_gap - 1e-3, f"least gap {wide:.2f} m")
-what = "among people: each step that leads to h < 0 says that it is not safe"
+what = "each step that leads to h < 0 says that it is not safe"
 record.check(what, entered > 0 and through["unflagged_violations"] == 0, f"{entered} steps with h < 0")
 record.key |= {"front: least gap [m]": wide, "front: time to goal [s]": through["time_to_goal"]}
 Markdown(
-    f"<details><summary>Answer</summary>\n\nIt backs away as fast as the people come, {backs:.0f} m in 40 s, and would go on. "
-    "The other one pays the price, and passes between two of them: h < 0 for "
+    f"<details><summary>Answer</summary>\n\nTwo robots back away as fast as the people come, {backs:.0f} m in 40 s, and would "
+    "go on. The third one pays the lower price, and passes between two of them: h < 0 for "
     f"{among.dt * entered:.1f} s, with a gap of {wide:.2f} m to the nearest body. It reports these steps as not "
-    "safe.\n\n</details>"
+    "safe. No price is right for every place: a robot that must not be pushed away needs a low one.\n\n</details>"
 )
 
 # %% jupyter={"source_hidden": true}
 # Animation
-movie = fronts["among people"].animate(width=8.0, every=0.4)
+movie = fronts[cheap].animate(width=8.0, every=0.4)
 record.animation(movie, "front")
 display(movie)
 
@@ -244,8 +249,8 @@ display(movie)
 # **Theory: when is a price exact?** For each hard constraint the solver computes a *multiplier* $\lambda$ (the "price" of
 # a row in chapter 08): how much the cost falls per metre by which the constraint gives way. If $p > \lambda$, giving way
 # costs more than it saves. Then the plan with a price is the plan with the hard constraint, wherever there is one
-# (Nocedal & Wright, *Numerical Optimization*, ch. 17). The price of `among_people()` is 100 for a metre in 0.1 s: the robot
-# enters a zone where waiting would cost more.
+# (Nocedal & Wright, *Numerical Optimization*, ch. 17). The prices of `among_people()` are 10 for a metre of decay and 400 for a
+# metre within a zone, each for 0.1 s: the robot enters a zone where waiting would cost more.
 #
 # **Why not a high price for walls?** Because prices are added up. Two people come along a wall. To give both 0.3 m more, the
 # robot would have to drive 0.5 m into the wall. If a metre has one price, that saves $2 \cdot 0.3 = 0.6$ m and costs 0.5 m: the

@@ -122,7 +122,7 @@ class Judge:
         return np.array(found) - self.s.r_robot
 
     def floors(self, h: Any, gaps: Any) -> Any:
-        """What a plan without hard decay must keep: h of walls, from which it can stop, and gaps to bodies.
+        """What a plan without hard decay must keep: h of walls, from which it can stop, gaps, zones.
 
         Negative where it does not; from `h` and `gaps` at each state of the plan, shape (N+1, obstacles).
         """
@@ -131,7 +131,12 @@ class Judge:
             1 - min(1.0, self.s.a_max * self.s.dt / self.s.v_max),
         )
         walls = h[1:, people:] - keep * h[:-1, people:]
-        return np.hstack([gaps[1:, :people] - self.s.body_gap, walls])
+        # a zone may have a price
+        zones = h[1 : self.s.N_h + 1, :people][
+            : self.s.N * (self.s.zone_price == np.inf)
+        ]
+        rows = (gaps[1:, :people] - self.s.body_gap, walls, zones)
+        return np.concatenate([each.ravel() for each in rows])
 
     def between(
         self, a: Any, b: Any, path: Any, times: Any, bow: float, dt: float

@@ -31,6 +31,7 @@ POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
         "terminal",
         "adversary",
         "among_people",
+        "walls",
     ],
 )
 def test_attack_breaks_nothing(attack, tmp_path):

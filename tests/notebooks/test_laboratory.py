@@ -217,7 +217,7 @@ def test_danger_and_goals_that_cannot_be_reached_are_said_in_words():
     world.change(people={0: {"position": [x + 1.2, y]}})
     reasons = explain(world.steps[0])
     assert reasons.safety == "Not safe: the robot is already too close to person 0."
-    world = make_world("circular crossing", 55, [AMONG_PEOPLE])
+    world = make_world("corridor", 55, [AMONG_PEOPLE])
     assert "it comes nearer to person" in sentence(world)
     fast = make_world(robots=[FAST])
     while fast.steps[0].feasible:
