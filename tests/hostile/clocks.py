@@ -247,7 +247,7 @@ class Loop:
             if bool(step.clock) != bool(jump) and not self.another_dt:
                 broken(
                     self.tally,
-                    "a clock that goes back is not told, or one that does not is",
+                    "a clock that goes back is not reported, or one that does not is",
                     where,
                 )
             found = [int(person.id[1:]) for person in step.scene.people]
