@@ -395,27 +395,34 @@ def test_the_laboratory_is_dragged_and_shared(lab_page):
     )
 
 
-def test_a_refused_drag_of_the_laboratory_snaps_back(lab_page):
+def test_a_goal_beside_a_wall_is_named_and_a_13th_person_refused(lab_page):
     lab, page = lab_page
     before = picture(page.locator(".szlib-lab-scene"))
     drag(page, (7.0, 2.3), (7.0, 2.3))
     page.locator(".szlib-remove").click()  # the person, who stands on the goal
     settle(page, "document.querySelector('.szlib-remove').disabled")
-    alone = picture(page.locator(".szlib-lab-scene"))
-    assert alone != before
     drag(page, (4.0, 0.0), (4.0, 2.2))
+    notes = "document.querySelector('.szlib-notes').textContent"
+    settle(page, f"{notes}.includes('cannot be reached')")
+    assert lab.world.scenario.goal == pytest.approx([4.0, 2.2], abs=0.1)
+    page.locator(".szlib-reset").click()
+    settle(page, f"!{notes}.includes('cannot be reached')")
+    assert picture(page.locator(".szlib-lab-scene")) == before
+    for n in range(1, 12):
+        page.locator(".szlib-add").click()
+        settle(
+            page,
+            f"document.querySelector('.szlib-remove').textContent === 'remove person {n}'",
+        )
+    full = picture(page.locator(".szlib-lab-scene"))
+    assert full != before
+    page.locator(".szlib-add").click()
     settle(
         page,
-        "document.querySelector('.szlib-error').textContent.includes('too close to the wall')",
+        "document.querySelector('.szlib-error').textContent.includes('number of people')",
     )
-    assert lab.world.scenario.goal[1] < 1.8
-    drag(page, lab.world.scenario.goal, (4.0, 0.0))
-    settle(page, "document.querySelector('.szlib-error').textContent === ''")
-    page.wait_for_timeout(300)
-    assert lab.world.scenario.goal == pytest.approx([4.0, 0.0], abs=0.1)
-    page.locator(".szlib-reset").click()
-    settle(page, "!document.querySelector('.szlib-remove').disabled")
-    assert picture(page.locator(".szlib-lab-scene")) == before
+    assert len(lab.world.people) == 12
+    assert picture(page.locator(".szlib-lab-scene")) == full
 
 
 def test_the_laboratory_runs_in_its_notebook(notebook):
