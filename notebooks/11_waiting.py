@@ -20,11 +20,11 @@
 # **Expectation.** The paper: a robot outside waits until the person is through. A robot inside backs out first.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [12 - Among people: routes, crowds,
+# [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [12 - Among people: ways, crowds,
 # and limits](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c-d · 30 min
 # · needs [10](10_corridor.ipynb) · exercises:
-# [6.4-6.5](exercises/sheet6_robot.ipynb#6.4-Predict,-then-run-(20-min)) · laboratory:
-# [13](13_laboratory.ipynb)
+# [6.4](exercises/sheet6_robot.ipynb#6.4-Predict,-then-run-(20-min)),
+# [6.6](exercises/sheet6_robot.ipynb#6.6-In-your-own-words-(10-min)) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot waits, and why it backs out of a passage, although no rule tells
 # it to.

@@ -108,6 +108,11 @@ record.figure(fig, "still")
 # on the time line, and try 2 m.
 # <details><summary>What to expect</summary>At 1.5 m it is too late: h is below 0 at once. At 2 m there is no good plan either for a
 # moment, but the robot passes with h above 0.</details>
+#
+# **9. Two doors.** Scene *two_doors*: drive with `MPCSettings()`, then with `MPCSettings.among_people()`. The ways of the
+# robot are violet: the one that is taken solid, the others dashed.
+# <details><summary>What to expect</summary>`MPCSettings()` looks for no ways, and waits before the person. With
+# `among_people()` the robot takes the other door.</details>
 
 
 # %% jupyter={"source_hidden": true}
@@ -148,6 +153,8 @@ tried = {
     "7: goal on a wall": try_scene("corridor", edit={"goal": [4.0, 2.2]}),
     "8: 1.5 m ahead": try_scene("corridor", at=2.5, edit=ahead[0]),
     "8: 2 m ahead": try_scene("corridor", at=2.5, edit=ahead[1]),
+    "9: two doors": try_scene("two_doors"),
+    "9: among_people()": try_scene("two_doors", "MPCSettings.among_people"),
 }
 table = pd.DataFrame(tried).T
 table[["time", "least h", "steps not safe", "arrived"]]
@@ -166,6 +173,7 @@ held = {
     "7: the robot waits beside its goal": table["blocked"].iloc[9:11].all()
     and not table["arrived"].iloc[9:11].any(),
     "8: 1.5 m is too late, 2 m is not": low.iloc[11] < 0 <= low.iloc[12] and unsafe.iloc[12] > 0,
+    "9: only among_people() takes the second door": table["arrived"].iloc[13:].tolist() == [False, True],
 }
 for what, holds in held.items() if record.cache.is_synthetic else ():
     record.check(what, bool(holds))

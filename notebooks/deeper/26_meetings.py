@@ -155,8 +155,8 @@ record.check(
 #
 # A larger $\gamma$ lets the robot come closer before it gives way. That is safe if the robot looks so far ahead that it
 # can stop: with $\gamma = 0.2$ it needs $N = N_h = 24$ steps, which is 2.4 s. We call this "bolder".
-# `MPCSettings.among_people()` has more: a route around walls, and, where several people are near, prices instead
-# of hard barriers (chapter 12).
+# `MPCSettings.among_people()` has more: ways around walls and people, and prices instead of hard barriers
+# (chapter 12).
 
 # %% jupyter={"source_hidden": true}
 # Table
@@ -337,8 +337,8 @@ record.claim(
 # whom it sees, and each of the others enters zones. The price is time where the robot has to choose a way. In the
 # intersection it is pushed up the hall, because with $\gamma = 0.05$ it gives way long before it has to; a
 # larger $\gamma$ with the barrier on a horizon in which the robot can stop mends this. Among people who stand around it, it
-# may stop before one of them although there is a gap: it plans no route, and only the choice of a side
-# (chapter 09) leads it out. With `among_people()` it arrives in all variations. The price is $h < 0$ for some time where
+# may stop before one of them although there is a gap: these settings look for no ways, and only the choice of a side
+# (chapter 09) leads the robot out. With `among_people()` it arrives in all variations. The price is $h < 0$ for some time where
 # five or more people are near: half a metre inside a zone on the circle, with a gap to all bodies. People here do not
 # react; those of notebook 29 do.
 

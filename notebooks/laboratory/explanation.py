@@ -16,6 +16,7 @@ from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
 _AT_LIMIT = 0.02  # a limit as near to the chosen acceleration as this share of the bound is active (assumed)
 _SLIGHT = 0.05  # below this share of the bound an acceleration, or of v_max a speed, is not named (assumed)
 _MOST_NAMED = 2  # persons and walls in one sentence
+_OF_WAYS = "way: ", "not: "  # beginnings of the lines of `Step.explain` on ways
 
 
 class Explanation(NamedTuple):
@@ -25,6 +26,7 @@ class Explanation(NamedTuple):
     ----------
     sentence : what the robot does, and why.
     safety : whether the step is safe, and why it is not.
+    way : the way that is taken, and those that are not; "" if none was looked for.
     notes : what else has to be known: a goal that cannot be reached, a robot that makes no progress.
     found : all admissible accelerations, with the limits of persons and walls.
     active : the limits that the sentence names.
@@ -32,6 +34,7 @@ class Explanation(NamedTuple):
 
     sentence: str
     safety: str
+    way: str
     notes: tuple[str, ...]
     found: AdmissibleControls
     active: tuple[BarrierLimit, ...]
@@ -54,7 +57,9 @@ def explain(step: szlib.Step) -> Explanation:
     """
     first, *rest = (line.strip() for line in step.explain().splitlines())
     meaning, _, danger = first.removeprefix("Step: ").partition("; ")
-    notes = tuple(_as_sentence(line) for line in rest if not line.startswith(("control", "nearest")))
+    way = " ".join(_as_sentence(line) for line in rest if line.startswith(_OF_WAYS))
+    is_shown = ("control", "nearest", *_OF_WAYS)
+    notes = tuple(_as_sentence(line) for line in rest if not line.startswith(is_shown))
     found = find_admissible_controls(step)
     active = _find_active(step, found) if step.feasible else ()
     if not step.feasible:
@@ -64,7 +69,7 @@ def explain(step: szlib.Step) -> Explanation:
     else:
         reason = _describe_freedom(step)
     safety = _as_sentence(danger) if danger != "safe" else "Safe, if people keep their velocity."
-    return Explanation(f"It {_describe_motion(step)}: {reason}.", safety, notes, found, active)
+    return Explanation(f"It {_describe_motion(step)}: {reason}.", safety, way, notes, found, active)
 
 
 def _as_sentence(text: str) -> str:

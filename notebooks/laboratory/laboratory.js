@@ -8,7 +8,7 @@ const GRAB_RADIUS = 16;  // distance within which the pointer takes hold of a th
 const ARROW = 0.5;  // length of the arrow of a person who stands; 1 m longer for each m/s [m]
 const FASTEST = 2.0;  // speed up to which the arrow of a person can be drawn [m/s]
 const LONGEST = 1200;  // time steps after which the laboratory pauses
-const ACTIVE = "#E69F00", SECOND = "#CC79A7";  // colours of the active limit, and of the second robot
+const ACTIVE = "#E69F00", SECOND = "#CC79A7", WAY = "#5E3C99";  // colours of the active limit, the second robot, ways
 const SLIDERS = [
   { name: "N", label: "N [steps]", title: "length of the plan", min: 2, max: 24, step: 1 },
   { name: "N_h", label: "N_h [steps]", title: "of these, with barriers", min: 1, max: 24, step: 1 },
@@ -19,7 +19,7 @@ const LEGEND = [
   ["\u2192", "#D55E00", "velocity of a person"], ["\u25a1", "black", "end of a wall"],
   ["\u25cc", SECOND, "second robot (in the charts dotted)"], ["\u25a0", "#99d8c7", "admissible accelerations"],
   ["\u2501", ACTIVE, "active limit, and whose it is"], ["\u25c7", "#555555", "chosen acceleration"],
-  ["\u2508", "#555555", "bound"],
+  ["\u2508", "#555555", "bound"], ["\u2501", WAY, "way that is taken"], ["\u2505", WAY, "other ways"],
 ];
 const HELP = "Drag people, the tip of a person's arrow (direction and speed), the robot (\u25cf), the goal (\u25c6) or the ends of "
   + "walls (\u25a1), at any time. Each change begins a new run from the time that is shown.";
@@ -58,6 +58,12 @@ function drawCircle(context, [px, py], radius, colour, width, dash = []) {
 function arrowTip([x, y, heading], speed) {
   const length = ARROW + speed;
   return [x + length * Math.cos(heading), y + length * Math.sin(heading)];
+}
+
+// Draws the ways of a robot: the one that is taken solid, the others dashed.
+function drawWays(context, view, [taken, ...others]) {
+  for (const points of others) drawLine(context, view, points, WAY, 1.5, [7, 4]);
+  if (taken) drawLine(context, view, taken, WAY, 2.5);
 }
 
 // Draws what can be dragged, the active limits, and the second robot, over the scene.
@@ -240,6 +246,7 @@ function build(el, content) {
   page.status = addElement(right, "div", { className: "szlib-status" }, { fontSize: "12px", fontVariantNumeric: "tabular-nums" });
   addElement(right, "strong", { textContent: "Why did it do this?" });
   page.why = addElement(right, "div", { className: "szlib-why", role: "status" }, { minHeight: "5.6em" });
+  page.way = addElement(right, "div", { className: "szlib-way" });
   page.safety = addElement(right, "div", { className: "szlib-safety" }, { fontWeight: "bold", margin: "4px 0" });
   page.notes = addElement(right, "div", { className: "szlib-notes" }, { fontSize: "12px" });
   page.rival = addElement(right, "div", { className: "szlib-rival" }, { fontSize: "12px" });
@@ -328,6 +335,7 @@ function render({ model, el }) {
     const mix = (snapshot, i) => (share < 1 && before?.snapshots[i] ? interpolate(before.snapshots[i], snapshot, share) : snapshot);
     const path = (i) => [...until.slice(0, -1).flatMap((each) => (each.snapshots[i] ? [each.snapshots[i].robot] : [])), mix(now.snapshots[i], i).robot];
     drawScene(scene, view, layout, mix(first, 0), path(0));
+    drawWays(scene, view, first.ways);
     drawHandles(scene, view, now, mix(first, 0), second && mix(second, 1), second && path(1), ghost);
     const times = entries.map((each) => each.snapshots[0].t), { robot, person } = layout.colours;
     const line = (i, name, colour, dash) => ({ values: entries.map((each) => each.snapshots[i]?.[name] ?? null), colour, dash });
@@ -351,6 +359,7 @@ function render({ model, el }) {
     page.title.textContent = now.title || now.scenario;
     page.status.textContent = [`t = ${first.t.toFixed(1)} s`, `speed ${first.speed.toFixed(2)} m/s`, ...h.map(([name, value]) => `h of the nearest ${name} ${value.toFixed(2)} m`)].join(", ");
     if (page.why.textContent !== first.sentence) page.why.textContent = first.sentence;
+    page.way.textContent = first.way;
     page.safety.textContent = first.safety;
     page.safety.style.color = first.safety.startsWith("Safe") ? "#00664d" : "#a00000";
     page.notes.textContent = first.notes.join(" ");

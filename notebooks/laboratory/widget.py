@@ -168,6 +168,8 @@ class Laboratory(anywidget.AnyWidget):
                 for limit in reasons.active
                 for kind, number in [name_limit(step, limit).rsplit(" ", 1)]
             ],
+            "ways": [way.points.round(3).tolist() for way in step.ways],
+            "way": reasons.way,
             "sentence": reasons.sentence,
             "safety": reasons.safety,
             "notes": reasons.notes,

@@ -19,8 +19,24 @@ from szlib.checks import Array, check_array, check_number, require
 from szlib.control.controller import advance
 from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
 
-PRESETS: dict[str, szlib.Scenario] = {**szlib.SCENARIOS, **szlib.MEETINGS}
-"""The scenes to begin with, by name: the four scenarios of the paper, and eleven meetings."""
+_TWO_DOORS = szlib.Scenario(
+    "two_doors",
+    start=np.array([-3.0, 0.0, 0.0, 0.0]),
+    goal=np.array([6.0, 0.0]),
+    people=(szlib.Person((2.0, 0.0), heading=np.pi),),
+    walls=np.array(
+        [
+            [(-4.0, -2.0), (7.0, -2.0)],
+            [(-4.0, 5.2), (7.0, 5.2)],
+            [(2.0, -2.0), (2.0, -0.9)],
+            [(2.0, 0.9), (2.0, 2.4)],
+            [(2.0, 4.2), (2.0, 5.2)],
+        ]
+    ),
+    title="Two doors: a person stands in the nearer one",
+)
+PRESETS: dict[str, szlib.Scenario] = {**szlib.SCENARIOS, **szlib.MEETINGS, _TWO_DOORS.name: _TWO_DOORS}
+"""The scenes to begin with, by name: the four scenarios of the paper, eleven meetings, and two doors."""
 CONSTRUCTORS: dict[str, Callable[..., szlib.MPCSettings]] = {
     "MPCSettings": szlib.MPCSettings,
     "MPCSettings.paper": szlib.MPCSettings.paper,

@@ -22,8 +22,9 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · next: [sheet
 # 7](sheet7_controller.ipynb) · [to do](../exercises/sheet6_robot.ipynb) ·
-# [solved](../solutions/sheet6_robot.ipynb) · 1 h 30 min · belongs to [07](../07_barriers.ipynb),
-# [09](../09_passing.ipynb), [11](../11_waiting.ipynb), [21](../deeper/21_feasibility.ipynb)
+# [solved](../solutions/sheet6_robot.ipynb) · 1 h 50 min · belongs to [07](../07_barriers.ipynb),
+# [09](../09_passing.ipynb), [11](../11_waiting.ipynb), [12](../12_among_people.ipynb),
+# [21](../deeper/21_feasibility.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.
@@ -162,7 +163,37 @@ def prediction(scenario, change, before, after, quantity):
 judges.check("prediction", prediction)
 
 # %% [markdown]
-# ## 6.5 In your own words (10 min)
+# ## 6.5 Count the ways (20 min)
+#
+# `paths`, shape (m, T, 2), are m ways of a robot to its goal [m]. `people`, shape (n, T, 2), is where n people are
+# at the same T times; some of them walk. All ways begin and end at the same two places, and at no time is the robot in a
+# body. Two ways are the same if they pass each person on the same side, and distinct if they differ at one person at
+# least. For somebody who walks, *in front* and *behind* are different sides. How many distinct ways are there?
+# (Chapter 12 says how a person can tell the side: by turning with the robot.)
+
+
+# %%
+def count_ways(paths, people):
+    """Number of distinct ways among the paths."""
+    ### BEGIN SOLUTION
+    offset = paths[:, None] - people
+    angles = np.unwrap(np.arctan2(offset[..., 1], offset[..., 0]), axis=-1)
+    turns = angles[..., -1] - angles[..., 0]
+    sides = np.round((turns - turns[0]) / (2 * np.pi))
+    return len(np.unique(sides, axis=0))
+    ### END SOLUTION
+
+
+# %%
+judges.check("count_ways", count_ways)
+
+# %% [markdown]
+# **Solution.** The turns of two ways around one person differ by a whole number of full turns, because both begin and end
+# at the same places. So the turns, relative to the first way, are rounded to whole numbers, and equal rows are the same way.
+# A plan of one row cannot become a plan of another row by small changes.
+
+# %% [markdown]
+# ## 6.6 In your own words (10 min)
 #
 # You must choose gamma for a robot in a hospital corridor. Which experiments of this sheet help, which do
 # not, and what would you have to measure in that corridor first? Write five to eight sentences.

@@ -92,7 +92,8 @@ EXERCISES: dict[str, tuple[str, ...]] = {
     "07": ("5.1-5.5", "6.1"),
     "08": ("7.1-7.8",),
     "09": ("6.2",),
-    "11": ("6.4-6.5",),
+    "11": ("6.4", "6.6"),
+    "12": ("6.5",),
     "21": ("6.3",),
 }
 """By number of the notebook: the tasks of the exercise sheets that belong to it."""
@@ -199,7 +200,7 @@ WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
     ("A zone of your own, and a barrier around it", ("07",), ("3.4-3.5", "6.1")),
     ("A controller of your own", ("08",), ("5.1-5.5", "7.1-7.3")),
     ("MPC with barriers, and the first meetings", ("09", "10"), ("7.4-7.8",)),
-    ("The robot yields, and drives among people", ("11", "12", "13"), ("6.2-6.5",)),
+    ("The robot yields, and drives among people", ("11", "12", "13"), ("6.2-6.6",)),
 ]
 """Topic, chapters and tasks of the exercise sheets of each of six weeks."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [

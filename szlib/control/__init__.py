@@ -7,7 +7,7 @@ verification        Euclidean distances, and steps computed again by other formu
 walls               walls from lines, polygons and the maps of ROS: `walls_from_map`
 people              people as the controller sees them: `Person`, `Tracker`
 controller          the base class of controllers, the robots that they drive, and their clock
-routes              where the plan heads: around walls, and past people who are met head-on
+ways                where the plan heads: around walls and between people, and past those met head-on
 problem             the problem of a step in matrices and symbols
 planner             the problem, and its solution by priorities
 step                what a step is asked, and what the controller decided: `Step`
@@ -32,7 +32,6 @@ from .obstacles import (
     segment_distance,
 )
 from .people import Person, TrackedPeople, Tracker
-from .routes import find_route
 from .settings import MPCSettings
 from .step import (
     STATUSES,
@@ -50,3 +49,4 @@ from .verification import (
     required_margin,
 )
 from .walls import read_walls, walls_from_grid, walls_from_map
+from .ways import Way, find_route

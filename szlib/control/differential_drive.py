@@ -67,10 +67,10 @@ from .people import (
     TrackedPeople,
     Tracker,
 )
-from .routes import Point
 from .settings import TOLERANCE, MPCSettings
 from .step import Scene, Step
 from .verification import ROUNDING, Report, find_gap, is_undecided, verify_step
+from .ways import Heading, Point
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
 # turns that are tried, in this order [rad]
@@ -195,6 +195,8 @@ class DriveStep:
     residual = _of_point("residual")
     stuck = _of_point("stuck")
     clock = _of_point("clock")
+    way = _of_point("way")
+    ways = _of_point("ways")
     walls_safe = _of_point("walls_safe")
     passively_safe = _of_point("passively_safe")
 
@@ -277,14 +279,12 @@ class _Point(MPCCBF):
     wheels: _Wheels
     own: Array  # state of the robot at this step
 
-    def _look_ahead(
-        self, at: Point, goal: Point, route: ArrayLike | None
-    ) -> tuple[Point, float]:
+    def _head(self, scene: Scene, goal: Point, route: ArrayLike | None) -> Heading:
         """As of `MPCCBF`, but straight to a `goal` so close that no wall lies between, as in a turn."""
-        away = dist(at, goal)
-        if away < self.settings.r_robot:
-            return goal, away
-        return super()._look_ahead(at, goal, route)
+        away = dist(scene.state[:2], goal)
+        if away < self.settings.r_robot and not scene.tracked.unknown:
+            return Heading(goal, away)
+        return super()._head(scene, goal, route)
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc whose wheels follow the point on a `path`."""

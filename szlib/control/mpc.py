@@ -36,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from math import dist, hypot, inf
+from operator import attrgetter
 from threading import get_ident
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -50,6 +51,7 @@ from ..checks import (
     check_number,
     check_point,
     check_vector,
+    require,
 )
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
@@ -57,12 +59,18 @@ from .controller import Controller, StepClock, find_stopping_path
 from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone
 from .people import People, Person, SpeedZone, TrackedPeople, Tracker, as_ellipse
 from .planner import Plan, Planner
-from .problem import Question, build_horizon, plan_braking, solve_by_ipopt
-from .routes import Point, RoutePlanner, find_boxes, find_target
+from .problem import (
+    Question,
+    build_horizon,
+    plan_along,
+    plan_braking,
+    solve_by_ipopt,
+)
 from .settings import TOLERANCE, MPCSettings
 from .step import Scene, Status, Step
 from .verification import AT_REST
 from .walls import find_solids, read_walls
+from .ways import Heading, Point, WayFinder, find_target
 
 _FEW = 24  # up to this number all obstacles are in the problem, of more those that are near
 _BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
@@ -125,7 +133,6 @@ class MPCCBF(Controller):
     settings: MPCSettings
     zone: Ellipse
     walls: Array
-    _routes: RoutePlanner | None
     _spare = 0.0  # what the radius in `settings` is larger than the disc [m]
 
     def __init__(
@@ -159,9 +166,10 @@ class MPCCBF(Controller):
     def _take_walls(self, walls: Any) -> None:
         self.walls = read_walls(walls)
         items = [Wall(*ends) for ends in self.walls.reshape(-1, 4).tolist()]
-        self._walls, self._solids, self._routes = items, find_solids(walls), None
+        self._solids = find_solids(walls)
         self._items = (*items, *self.obstacles)
         self._fixed = Obstacles.of(self._items, self.settings)
+        self._ways = WayFinder(self._fixed, self.settings)
         self._near_from, self._near_reach = (0.0, 0.0), 0.0
         self._take_near(self._items)
 
@@ -204,8 +212,7 @@ class MPCCBF(Controller):
         self.tracker.reset()
         self._planner.reset()
         self._near_reach, self._room = 0.0, ((0.0, 0.0), -inf)
-        if self._routes:
-            self._routes.reset()
+        self._ways.reset()
 
     def step(
         self,
@@ -245,7 +252,7 @@ class MPCCBF(Controller):
         now : time, by the same clock [s]; default: `dt` after the last step.
         route : a way to the goal from a global planner, corners, shape (m, 2) [m]. The plan heads for its
             farthest point in sight, at most `settings.lookahead` ahead of where the route passes the robot;
-            the people and walls on it are avoided as always. Default: a route of its own (`find_route`) if
+            the people and walls on it are avoided as always. Default: a way of its own (`Step.ways`) if
             `settings.lookahead` is finite, else none.
         state_age : time from the measurement of `state` to `now`, at most 1 s [s].
 
@@ -263,11 +270,11 @@ class MPCCBF(Controller):
             x = clock.bring_forward(self.robot, np.array(x), age, np.zeros(2)).tolist()
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._make_scene(x, towards, tracked, self._find_near(*x))
-        ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
-        remaining = way_length if way_length < inf else dist(x[:2], towards)
-        target = self._find_target(scene, ahead)
+        heading = self._head(scene, towards, route)
+        way = heading.length
+        remaining = way if way < inf else dist(x[:2], towards)
         self._planner.budget.begin(began)
-        status, plan = self._decide(scene, target)
+        status, plan = self._decide(scene, heading)
         walls_safe, passively_safe, brakes = self._guard(scene, plan)
         if brakes:
             inputs = plan_braking(self.settings, x[2:])
@@ -282,38 +289,48 @@ class MPCCBF(Controller):
             status=status,
             walls_safe=walls_safe,
             passively_safe=passively_safe,
-            target=np.array(target),
+            target=np.array(heading.target),
             solve_time=perf_counter() - began,
             timed_out=plan.timed_out,
             scene=scene,
-            way_length=way_length,
+            way_length=way,
+            ways=heading.ways,
             stuck=clock.time_without_progress(remaining, towards),
             clock=clock.describe(stamps, self.tracker.memory),
         )
 
-    def _decide(self, scene: Scene, target: Point) -> tuple[Status, Plan]:
+    def _decide(self, scene: Scene, heading: Heading) -> tuple[Status, Plan]:
         """The plan: of least cost if one satisfies the rows, else the one that violates least by priorities.
 
+        The plan before may be a poor local optimum, around the wrong end of a wall; so where the way was just
+        looked for, it is compared with the one that is found along the way.
         A plan that violates a floor may be a poor local optimum, which leads through a wall; so it is
         compared with the one that is found from full braking.
         """
         s, last = self.settings, self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        question = Question(scene.state, target, last, scene.zones, scene.near_fixed)
+        target, fixed = heading.target, scene.near_fixed
+        question = Question(scene.state, target, last, scene.zones, fixed)
         guess = self._plan + self._change
         if s.solver == "ipopt":
             inputs = solve_by_ipopt(s, question, guess.clip(-s.a_max, s.a_max))
             if inputs is not None:
-                return "optimal", Plan(inputs, (), False, False)
+                return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
+        if heading.is_searched and not plan.timed_out:
+            points = heading.ways[0].at(np.array(s.times))
+            along = plan_along(s, scene.state, points)
+            other = self._planner.plan(question, along)
+            is_late = other.timed_out
+            plan = min(plan, other, key=attrgetter("rank"))._replace(timed_out=is_late)
         if plan.violations == (inf,):
             return "braking", plan._replace(inputs=plan_braking(s, scene.state[2:]))
         if not plan.is_relaxed:
             is_too_fast = hypot(*scene.state[2:]) > s.v_max + TOLERANCE
             return "relaxed" if is_too_fast else "optimal", plan
-        if max(plan.violations[:-1], default=inf) > 0.0 and not plan.timed_out:
+        if max(plan.violations, default=0.0) > 0.0 and not plan.timed_out:
             braking = plan_braking(s, scene.state[2:])
             other = self._planner.plan(question, braking)
-            if other.violations < plan.violations:
+            if other.rank < plan.rank:
                 return "restarted", other
         return "relaxed", plan
 
@@ -426,20 +443,6 @@ class MPCCBF(Controller):
             self._take_near([self._items[i] for i in self._near])
         return self._near
 
-    def _look_ahead(
-        self, at: Point, goal: Point, route: ArrayLike | None
-    ) -> tuple[Point, float]:
-        """The point of the route that attracts the plan, and the length of the way to the `goal` [m]."""
-        s = self.settings
-        if route is None and s.lookahead == inf:
-            return goal, dist(at, goal)
-        if self._routes is None:
-            self._routes = RoutePlanner(self.walls, find_boxes(self._walls, s))
-        if route is None:
-            return self._routes.aim(at, goal, s.lookahead)
-        corners = check_array("route", route, (..., 2))
-        return self._routes.follow(corners, at, goal, s.lookahead)
-
     def _make_scene(
         self,
         state: Sequence[float],
@@ -472,16 +475,26 @@ class MPCCBF(Controller):
             near,
         )
 
-    def _find_target(self, scene: Scene, ahead: Point) -> Point:
-        """The point that attracts the plan; among unknown people, where full braking ends."""
-        (x, y, vx, vy), s = scene.state, self.settings
+    def _head(self, scene: Scene, goal: Point, route: ArrayLike | None) -> Heading:
+        """Where the plan heads; among unknown people, where full braking ends."""
+        s, (x, y, vx, vy) = self.settings, scene.state
+        at, found = (x, y), None
+        if route is not None:
+            corners = check_array("route", route, (..., 2))
+            is_line, expected = corners.ndim < 3, "corners, shape (m, 2)"
+            require(is_line, "route", corners.shape, expected, SolverError)
+            found = self._ways.follow(at, goal, corners)
+        if not found and (route is not None or s.lookahead < inf):
+            found = self._ways.find(at, goal, scene.zones)
+        heading = found or Heading(goal, dist(at, goal))
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max
-            return x + vx * time / 2, y + vy * time / 2
-        if not scene.people:
-            return ahead
-        zones = scene.zones.groups[0].numbers.tolist()
-        return find_target((x, y), ahead, zones, scene.near_fixed, s)
+            return heading._replace(target=(x + vx * time / 2, y + vy * time / 2))
+        if scene.people and not heading.ways:
+            zones, fixed = scene.zones.groups[0].numbers.tolist(), scene.near_fixed
+            target = find_target((x, y), heading.target, zones, fixed, s)
+            heading = heading._replace(target=target)
+        return heading
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.

@@ -263,6 +263,20 @@ class Obstacle:
         """
         return cls.distance(x, y, t, *numbers)
 
+    @classmethod
+    def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
+        """Boxes that hold all places nearer to obstacles than `offsets`: corners, shape (n, 2) each [m].
+
+        By default everywhere: then a map of ways measures each of its cells.
+
+        Parameters
+        ----------
+        numbers : of the obstacles, shape (n, m).
+        offsets : distances, shape (n,) [m].
+        """
+        everywhere = np.full((len(numbers), 2), np.inf)
+        return -everywhere, everywhere
+
     def margin(self, settings: MPCSettings) -> float:
         """Margin that the robot keeps by its `settings` [m]: eps."""
         return settings.eps
@@ -356,6 +370,21 @@ class Wall(Obstacle):
     """A wall: a segment, whose `numbers` are its ends (xa, ya, xb, yb) [m] (paper, eq. 3-5)."""
 
     kind = "wall"
+
+    @classmethod
+    def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
+        """See `Obstacle.bounds`; `numbers` and `offsets` as there.
+
+        A wall of length L is nearer than rho within sqrt(L^2/4 + L rho) of its middle, along the wall, and
+        within sqrt(l rho - l^2/4) across, with l = min(L, 2 rho).
+        """
+        ends = numbers.reshape(-1, 2, 2)
+        length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        side = np.minimum(length, 2 * offsets)
+        beyond = np.sqrt(length**2 / 4 + length * offsets) - length / 2
+        across = np.sqrt(side * offsets - side**2 / 4)
+        reach = np.maximum(beyond, across)[:, None]
+        return ends.min(axis=1) - reach, ends.max(axis=1) + reach
 
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:

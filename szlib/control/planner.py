@@ -60,6 +60,9 @@ CONVERGED = 1e-3
 NEAR = 1.0
 _ROWS = 16  # programs are built for multiples of so many rows
 _FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
+# Largest multiplier of the speed limit. Rows that contradict each other give huge ones, which would spoil
+# the next steps.
+_MOST_CURVED = 1e3
 _MOST_PROBLEMS = 256  # numbers of obstacles for which a planner keeps what it has built
 _EQUAL, _SOFT = 5, 8  # DAQP's kinds of constraints
 _SOLVED, _VIOLATED = (
@@ -76,16 +79,23 @@ class Plan(NamedTuple):
     Attributes
     ----------
     inputs : accelerations, shape (N, 2) [m/s2].
+    cost : with the prices of what is violated, before the last change if it converged.
     violations : if rows without a price contradict each other, the sums of the violations of walls, bodies
-        and zones [m], and then the cost: of two plans the better one has the lesser tuple.
+        and zones [m]; else empty.
     is_relaxed : True if rows without a price contradict each other.
     timed_out : True if time was up before it converged.
     """
 
     inputs: Array
+    cost: float
     violations: tuple[float, ...]
     is_relaxed: bool
     timed_out: bool
+
+    @property
+    def rank(self) -> tuple[Any, ...]:
+        """Of two plans the better one has the lesser rank: by violations, and then by cost."""
+        return self.violations, self.cost
 
 
 class TimeBudget:
@@ -252,7 +262,7 @@ class _Prepared:
             return None
         on_speed = problem.multipliers
         np.negative(found[1][problem.inputs.size :][: len(on_speed)], out=on_speed)
-        np.maximum(on_speed, 0.0, out=on_speed)
+        np.clip(on_speed, 0.0, _MOST_CURVED, out=on_speed)
         return found[0], is_relaxed
 
     def _solve_levels(self) -> tuple[Array, Array, bool] | None:
@@ -286,16 +296,17 @@ class _Prepared:
         return bool((lower > TOLERANCE).any())
 
     def sum_violations(self) -> tuple[float, ...]:
-        """Sums of the violations of walls, bodies and zones at the plan, and then the cost."""
+        """Sums of the violations of walls, bodies and zones at the plan [m]."""
         p = self.problem
         violated = np.maximum(p.lower[p.first :], 0.0)
-        floors = (
-            violated[p.levels == each].sum()
-            for each in Priority
-            if each < Priority.DECAY
-        )
-        sums = [round(float(each), 4) for each in floors]
-        return (*sums, float(p.cost[0] + violated @ self.prices))
+        floors = (each for each in Priority if each < Priority.DECAY)
+        sums = (violated[p.levels == each].sum() for each in floors)
+        return tuple(round(float(each), 4) for each in sums)
+
+    def sum_cost(self) -> float:
+        """The cost of the plan, with the prices of what it violates."""
+        p = self.problem
+        return float(p.cost[0] + np.maximum(p.lower[p.first :], 0.0) @ self.prices)
 
 
 class Planner:
@@ -381,16 +392,15 @@ class Planner:
             if self.budget.is_spent:
                 timed_out = True
                 break
-        self._on_speed[:] = problem.multipliers
+        self._on_speed[:] = 0.0 if is_failed else problem.multipliers
         np.minimum(np.maximum(problem.inputs, -s.a_max), s.a_max, out=problem.inputs)
         if not is_converged:
             limit_speed(s, question.state[2:], problem.inputs)
         inputs = problem.inputs.copy()
         if is_failed:
-            return Plan(inputs, (inf,), True, False)
-        if not is_relaxed and is_converged:
-            return Plan(inputs, (), False, timed_out)
-        problem.evaluate()
-        if is_relaxed or prepared.is_violated():
-            return Plan(inputs, prepared.sum_violations(), True, timed_out)
-        return Plan(inputs, (), False, timed_out)
+            return Plan(inputs, inf, (inf,), True, False)
+        if is_relaxed or not is_converged:
+            problem.evaluate()
+            is_relaxed = is_relaxed or prepared.is_violated()
+        violations = prepared.sum_violations() if is_relaxed else ()
+        return Plan(inputs, prepared.sum_cost(), violations, is_relaxed, timed_out)

@@ -125,6 +125,18 @@ def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
     return np.array(plan)
 
 
+def plan_along(s: MPCSettings, state: Sequence[float], points: Array) -> Array:
+    """Inputs with which a robot in this `state` follows `points` at the times of `s`, shape (N, 2) [m/s2]."""
+    at, v, plan = np.array(state[:2]), np.array(state[2:]), list[Array]()
+    for point, length in zip(points[1:], s.step_lengths, strict=True):
+        dt = s.dt * length
+        velocity = (point - at) / dt
+        velocity *= min(1.0, s.v_max / (hypot(*velocity) or 1.0))
+        plan.append(((velocity - v) / dt).clip(-s.a_max, s.a_max))
+        at, v = at + dt * v + dt**2 / 2 * plan[-1], v + dt * plan[-1]
+    return np.array(plan)
+
+
 def limit_speed(s: MPCSettings, velocity: Sequence[float], inputs: Array) -> None:
     """Change `inputs`, shape (N, 2), so that a robot with this `velocity` is at no time too fast, by `s`.
 

@@ -65,18 +65,18 @@ class MPCSettings:
     v_max : largest Euclidean speed [m/s]. The paper gives 1 m/s, and does not say that it is the Euclidean
         speed (assumed).
     r_robot : radius of the robot [m].
-    lookahead : the plan heads for the point of the route that lies at most this far ahead [m]: see
-        `szlib.control.routes`. `inf`, as in the paper: there is no route, and the plan heads for the goal.
-        Among hundreds of walls a new goal may take a second; a `route` can be given instead (`MPCCBF.step`).
+    lookahead : the plan heads for the point of the way that lies at most this far ahead [m]: see
+        `szlib.control.ways`. `inf`, as in the paper: no way is looked for, and the plan heads for the goal.
+        On a large map a new goal takes some 0.1 s.
     eps : margin for the error of the approximate distances [m].
     margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
         least eps (see `Wall.margin`). "paper": eps, which allows overlaps with the ends of walls shorter
         than r_robot^2 / eps.
     zone_speed : walking speed whose social zone is used, if a zone depends on speed [m/s].
-    pass_side : the side on which the robot passes a person whom it meets head-on: "right" or "left".
+    pass_side : the side on which the robot prefers to pass a person whom it meets head-on: "right" or "left".
     head_on_share : a meeting is head-on while the goal lies within this share of the half-angle under which
         the robot sees the person's zone; the rule of the side acts up to twice this share. At most 0.5; 0
-        switches the rule off, as in the paper. See `routes.find_target`.
+        switches the rule off, as in the paper. See `ways.find_target`.
     terminal : what the plan ends in. "none": nothing, as in the paper. "rest": zero velocity; see the proof
         in `szlib.control.mpc`.
     decay_price, zone_price : prices of a metre, and 0.1 s, of decay of h beyond gamma, and of h < 0 of a zone
@@ -242,10 +242,10 @@ class MPCSettings:
     def among_people(cls, **changes: Any) -> MPCSettings:
         """The controller that a robot should run among people, with `changes` by name.
 
-        It plans 3 s ahead, in 14 steps with barriers on each, follows a route around walls to a point at
-        most 1 m farther than it can come, and prefers a smooth ride. A decay of h beyond gamma has a price,
-        and a zone a high one, so that the robot passes where people leave it no other way: see `Step.safe`
-        and `Step.explain`. Notebook 12 compares it with the paper's controller.
+        It plans 3 s ahead, in 14 steps with barriers on each, takes a way around walls and between people, to
+        a point at most 1 m farther than it can come, and prefers a smooth ride. A decay of h beyond gamma has
+        a price, and a zone a high one, so that the robot passes where people leave it no other way: see
+        `Step.safe` and `Step.explain`. Notebook 12 compares it with the paper's controller.
 
         Examples
         --------
@@ -256,7 +256,7 @@ class MPCSettings:
         """
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
         reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
-        own = {"gamma": 0.2, "grid": grid, "jerk_weight": 5.0, "lookahead": reach + 1.0}
+        own = {"gamma": 0.2, "grid": grid, "jerk_weight": 6.0, "lookahead": reach + 1.0}
         own |= {"decay_price": 10.0, "zone_price": 400.0, "body_gap": 0.2}
         own |= {"max_iterations": 8}
         return cls(**{**own, **changes})

@@ -15,9 +15,9 @@ from ..zones.ellipses import Ellipse
 from .obstacles import Obstacle, Obstacles, Path, Priority, find_bodies
 from .people import Person, TrackedPeople
 from .problem import build_horizon, list_conditions
-from .routes import blocks
 from .settings import TOLERANCE, MPCSettings
 from .verification import Report, Row, verify_step
+from .ways import Way, blocks
 
 Status = Literal["optimal", "relaxed", "restarted", "braking"]
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -154,7 +154,8 @@ class Step:
     solve_time : wall-clock time of the whole step [s].
     timed_out : True if the plan was cut short because time was up (`MPCSettings.time_limit` or `deadline`).
     scene : what the step was asked.
-    way_length : length of the way to the goal [m]: of the route, else straight; inf if no route was found.
+    way_length : length of the way to the goal [m]: of the route, else straight; inf if there is none.
+    ways : ways to the goal, the one that is taken first; empty where none was looked for (`lookahead`).
     stuck : time for which the robot has come no nearer to its goal, from 5 s on; 0 before, while it
         approaches, and at the goal [s].
     clock : what is wrong with the times given to `MPCCBF.step`, in a sentence; "" if nothing is.
@@ -183,6 +184,7 @@ class Step:
     timed_out: bool
     scene: Scene
     way_length: float = 0.0
+    ways: tuple[Way, ...] = ()
     stuck: float = 0.0
     clock: str = ""
 
@@ -191,6 +193,11 @@ class Step:
         """States x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s]."""
         horizon = build_horizon(self.scene.settings)
         return horizon.states(np.array(self.scene.state), self.inputs)
+
+    @property
+    def way(self) -> str:
+        """The way that is taken in words, such as "left of person 3, behind person 5"; "" without ways."""
+        return self.ways[0].name if self.ways else ""
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -266,11 +273,12 @@ class Step:
 
     @property
     def goal_blocked(self) -> bool:
-        """True if the goal cannot be reached, h < 0 there: because of a wall, or of a person who stands.
+        """True if the goal cannot be reached: h < 0 there, or no way leads there.
 
-        A person slower than `people.STANDING_SPEED` counts as standing. The robot waits beside them.
+        A person slower than `people.STANDING_SPEED` counts as standing. The robot waits beside them; without
+        a way it goes to the nearest point that it can reach.
         """
-        return self.scene.goal_blocked
+        return self.scene.goal_blocked or self.way_length == inf
 
     @property
     def rejected(self) -> int:
@@ -345,6 +353,9 @@ class Step:
         if len(self.h):
             i = int(np.argmin(self.h))
             lines.append(f"  nearest is {scene.name(i)}: h = {self.h[i]:.3g} m")
+        if self.ways:
+            lines.append(f"  way: {self.way}")
+            lines += [f"  not: {self._explain_other(way)}" for way in self.ways[1:]]
         if not self.feasible:
             lines.append(
                 f"  the plan violates {report.worst.name} by {report.slack:.2g}"
@@ -377,14 +388,15 @@ class Step:
             notes.append(
                 f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one"
             )
-        if self.goal_blocked:
+        if self.scene.goal_blocked:
             notes.append(
                 f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
                 "helps: another goal"
             )
         if self.way_length == inf:
             notes.append(
-                "walls leave no way to the goal, so the plan heads straight for it; what helps: another goal"
+                "walls leave no way to the goal, so the robot goes to the nearest point that it can "
+                "reach; what helps: another goal"
             )
         if self.rejected:
             notes.append(
@@ -393,6 +405,13 @@ class Step:
         if self.stuck:
             notes.append(f"no progress for {self.stuck:.1f} s, {self._explain_stuck()}")
         return [f"  {note}" for note in [*notes, self.clock] if note]
+
+    def _explain_other(self, way: Way) -> str:
+        """Why another way is not taken."""
+        more = way.cost - self.ways[0].cost
+        if more >= 0:
+            return f"{way.name}, which costs {more:.1f} s more"
+        return f"{way.name}, which is only {-more:.1f} s cheaper than the way that it is on"
 
     def _explain_stuck(self) -> str:
         """How far the goal is, and what holds the robot: the barriers that are at their limit."""

@@ -27,6 +27,14 @@ def wrap(angle):
     return np.angle(np.exp(1j * angle))
 
 
+def sides(paths, people):
+    """Whole turns of each way around each person, more than those of the first way, as a set of rows."""
+    d = paths[:, None] - people
+    steps = wrap(np.diff(np.arctan2(d[..., 1], d[..., 0])))
+    turns = steps.sum(axis=-1) / (2 * np.pi)
+    return {tuple(row) for row in np.rint(turns - turns[0]).astype(int).tolist()}
+
+
 def bearing(ref, other):
     return np.arctan2(other[1] - ref[1], other[0] - ref[0])
 
@@ -741,6 +749,27 @@ SHEET6: dict[str, list[tuple[str, Answer]]] = {
                 szlib.SCENARIOS[change[0]],
                 szlib.MPCCBF(szlib.Ellipse((0.1, 0), (0.9, 0.7))),
             ).metrics(),
+        ),
+    ],
+    "count_ways": [
+        ("these are all ways", lambda paths, people: len(paths)),
+        ("np.unwrap removes the jumps", lambda paths, people: 1),
+        ("how many there may be", lambda paths, people: 2 ** len(people)),
+        (
+            "from where they are at that time",
+            lambda paths, people: len(sides(paths, people[:, :1])),
+        ),
+        (
+            "not from where they end",
+            lambda paths, people: len(sides(paths, people[:, -1:])),
+        ),
+        (
+            "are added up",
+            lambda paths, people: len({sum(row) for row in sides(paths, people)}),
+        ),
+        (
+            "only the first person",
+            lambda paths, people: len(sides(paths, people[:1])),
         ),
     ],
 }

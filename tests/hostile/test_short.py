@@ -32,6 +32,7 @@ POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
         "adversary",
         "among_people",
         "walls",
+        "ways",
     ],
 )
 def test_attack_breaks_nothing(attack, tmp_path):

@@ -217,8 +217,9 @@ def test_danger_and_goals_that_cannot_be_reached_are_said_in_words():
     world.change(people={0: {"position": [x + 1.2, y]}})
     reasons = explain(world.steps[0])
     assert reasons.safety == "Not safe: the robot is already too close to person 0."
-    world = make_world("corridor", 55, [AMONG_PEOPLE])
-    assert "it comes nearer to person" in sentence(world)
+    world = make_world("making_room", robots=[AMONG_PEOPLE])
+    said = [sentence(advance(world, 1)) for _ in range(40)]
+    assert any("it comes nearer to person" in each for each in said)
     fast = make_world(robots=[FAST])
     while fast.steps[0].feasible:
         fast.advance()
@@ -227,6 +228,29 @@ def test_danger_and_goals_that_cannot_be_reached_are_said_in_words():
     assert reasons.active == () and reasons.notes[0].startswith(
         "The plan violates the condition of person 0"
     )
+
+
+def test_the_ways_are_drawn_and_named_and_none_where_none_is_looked_for():
+    (shown,) = ask(Laboratory("two_doors", zone=ZONE), "show")["snapshots"]
+    assert shown["ways"] == [] and shown["way"] == ""
+    lab = Laboratory("two_doors", zone=ZONE, robots=[AMONG_PEOPLE])
+    (shown,) = ask(lab, "show")["snapshots"]
+    (step,) = lab.world.steps
+    assert shown["way"].startswith(f"Way: {step.way}.") and step.ways
+    assert not any(note.startswith(("Way", "Not: ")) for note in shown["notes"])
+    assert np.allclose(shown["ways"][0][-1], PRESETS["two_doors"].goal, atol=0.2)
+    assert len(shown["ways"]) == len(step.ways)
+
+
+def test_among_people_takes_the_second_door():
+    robots = [AMONG_PEOPLE, RobotOptions()]
+    world, highest = make_world("two_doors", robots=robots), [0.0, 0.0]
+    for _ in range(200):
+        world.advance()
+        highest = [max(y, s[1]) for y, s in zip(highest, world.states, strict=True)]
+    there, waits = (state[:2] for state in world.states)
+    assert highest[0] > 2.4 and np.hypot(*(there - (6, 0))) < 0.2
+    assert highest[1] < 2.4 and waits[0] < 2, "the defaults wait before the person"
 
 
 # --- the page ----------------------------------------------------------------------------------------

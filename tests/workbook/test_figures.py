@@ -172,6 +172,41 @@ MAPS = {
     "step": lambda f: figures.plot_step(f("step")),
     "robot paths": lambda f: figures.plot_robot_paths({"a": f("log"), "b": f("log")}),
 }
+
+
+@pytest.fixture(scope="module")
+def ways_step():
+    people = [szlib.Person((3.0, y), heading=np.pi) for y in (-0.9, 0.0, 0.9)]
+    settings = szlib.MPCSettings.among_people(time_limit=np.inf)
+    controller = szlib.MPCCBF(ZONE, settings=settings, walls=[[(-1, -4), (9, -4)]])
+    return controller.step((0, 0, 0, 0), (8, 0), people)
+
+
+def test_the_way_that_is_taken_is_solid_and_the_others_are_dashed(ways_step):
+    ax = figures.plot_ways(ways_step)
+    assert len(ways_step.ways) > 1 and in_metres(ax)
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    lines = [line for line in ax.lines if line.get_label() in names]
+    assert [line.get_linestyle() == "-" for line in lines] == [True, False]
+    assert len({line.get_color() for line in lines}) == len(lines)
+    for i, (way, line, name) in enumerate(
+        zip(ways_step.ways, lines, names, strict=True)
+    ):
+        assert np.array_equal(line.get_xydata(), way.points)
+        word = "not taken" if i else "taken"
+        assert name == f"{word}: {way.name}, cost {way.cost:.1f} s"
+    assert {text.get_text() for text in ax.texts} == {"0", "1", "2"}
+    x0, x1 = ax.get_xlim()
+    assert x0 < 0 and x1 > 8
+
+
+def test_without_ways_the_scene_is_drawn(step):
+    assert step.ways == ()
+    ax = figures.plot_ways(step)
+    assert ax.get_legend() is None and ax.get_title() == "No way was looked for"
+    assert in_metres(ax)
+
+
 GRAPHS = {
     "speeds": lambda f: figures.plot_speed_histogram(np.ones(9), np.zeros(9)),
     "los-distance": lambda f: figures.plot_distance_by_direction(f("samples")),

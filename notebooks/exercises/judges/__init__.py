@@ -7,7 +7,7 @@ sheet2_outliers   complementary coordinates, nearest approaches, LOF's blind spo
 sheet3_zones      a slice, its zone, the smallest ellipse, a zone of your own
 sheet4_certainty  quantiles, extremes, p-values, the null model
 sheet5_barriers   distances to zones and walls, the barrier row, the margin
-sheet6_robot      speed limit, gamma by experiment, the terminal proof, predictions
+sheet6_robot      speed limit, gamma by experiment, the terminal proof, predictions, distinct ways
 sheets            `check` and `hint`, over all sheets
 """
 

@@ -1,4 +1,4 @@
-"""Sheet 6: the robot's speed limit, gamma by experiment, the plan of the terminal proof, predictions."""
+"""Sheet 6: the robot's speed limit, gamma by experiment, the terminal proof, predictions, distinct ways."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from szlib.checks import Array
 from szlib.control.mpc import MPCCBF
 from szlib.control.settings import MPCSettings
 from szlib.simulation.closed_loop import simulate
@@ -123,6 +124,57 @@ def _judge_predictions(ask: Callable[..., Any], args: Args) -> str:
     return ""
 
 
+def _draw_ways(rng: Rng) -> Args:
+    """Twelve ways of a robot from (0, 0) to (8, 0) in 10 s among three people, one of whom walks at least."""
+    shares = np.linspace(0.0, 1.0, 101)[:, None]
+    at, velocity = rng.uniform((2.5, -2.0), (5.5, 2.0), (3, 2)), rng.uniform(0.2, 0.4, (3, 2))
+    velocity *= rng.choice([-1.0, 1.0], (3, 2)) * (
+        0.5,
+        1.0,
+    )  # far from the start at first, from the goal at last
+    velocity[1:] *= rng.integers(0, 2, (2, 1))
+    people = (at - 5.0 * velocity)[:, None] + 10.0 * shares * velocity[:, None]
+    paths: list[Array] = []
+    while len(paths) < 12:
+        corners = [(0.0, 0.0), *((x, rng.uniform(-4, 4)) for x in (2.0, 4.0, 6.0)), (8.0, 0.0)]
+        x, y = np.transpose(corners)
+        times = np.linspace(0, 1, len(corners)) + np.array([0.0, *rng.uniform(-0.1, 0.1, 3), 0.0])
+        path = np.column_stack([np.interp(shares[:, 0], times, each) for each in (x, y)])
+        if np.hypot(*np.moveaxis(path - people, -1, 0)).min() > 0.5:
+            paths.append(path)
+    return np.array(paths).round(3), people.round(3)
+
+
+def _find_turns(paths: Array, people: Array) -> Array:
+    """Angles by which people turn who look at the robot, shape (ways, people) [rad]."""
+    offset = paths[:, None] - people
+    angles = np.unwrap(np.arctan2(offset[..., 1], offset[..., 0]), axis=-1)
+    return np.asarray(angles[..., -1] - angles[..., 0])
+
+
+def _count(paths: Array, people: Array) -> int:
+    return _count_rows(_find_turns(paths, people))
+
+
+def _count_rows(turns: Array) -> int:
+    """Number of rows of angles that differ by a full turn."""
+    return len(np.unique(np.round((turns - turns[0]) / (2 * np.pi)), axis=0))
+
+
+def _count_sums(paths: Array, people: Array) -> int:
+    """The number that comes out if the turns around all people are added up."""
+    return _count_rows(_find_turns(paths, people).sum(axis=1, keepdims=True))
+
+
+def _draw_scenes(rng: Rng) -> Iterator[Args]:
+    """Twenty scenes, and one in which distinct ways have the same sum of turns."""
+    for _ in range(20):
+        yield _draw_ways(rng)
+    while _count_sums(*(last := _draw_ways(rng))) == _count(*last):
+        pass
+    yield last
+
+
 TASKS = (
     make_task(globals(), "speed_limit", repeat(_draw_approach), solution=_limit),
     make_task(globals(), "largest_gamma", _draw_robots, solution=_largest, allowed=("szlib",)),
@@ -133,4 +185,5 @@ TASKS = (
         solution=lambda plan: np.vstack([plan[1:], np.zeros((1, 2))]),
     ),
     make_task(globals(), "prediction", _draw_changes, drive=_judge_predictions),
+    make_task(globals(), "count_ways", _draw_scenes, solution=_count),
 )

@@ -4,7 +4,7 @@ The paper gives no coordinates.  They are assumed: a person stands, or walks at 
 way of a robot that starts at rest.  World frame, metres and seconds.
 
 The side on which the robot passes is not among the claims: nothing in the paper's formulation prefers one
-(see `szlib.control.routes`).
+(see `szlib.control.ways`).
 
 >>> import szlib
 >>> list(szlib.SCENARIOS)

@@ -7,7 +7,7 @@ style        sizes, labels in metres, people, legends
 tracks       where people walked, how fast, and how many rows each stage keeps
 encounters   the attentional space, paths, and where the other person is
 zones        outliers, the hull, zones by speed, the pair correlation
-control      distances and barriers, and the accelerations that a step allows
+control      distances and barriers, the accelerations that a step allows, and its ways
 simulation   runs of the robot, and their animations
 movies       runs as players in a browser
 comparisons  many runs or fits: sweeps, strategies, intervals, claims, sites
@@ -29,6 +29,7 @@ from .control import (
     plot_distance,
     plot_distance_error,
     plot_step,
+    plot_ways,
 )
 from .encounters import (
     animate_encounter,

@@ -1,0 +1,681 @@
+"""Ways around what is fixed, through space and time; and the target beside people who are met head-on."""
+
+from __future__ import annotations
+
+import copy
+from math import asin, atan2, cos, hypot, pi, sin
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+import szlib
+from szlib.checks import Array
+from szlib.control import HalfPlane, Obstacles, Wall, Zone, find_route
+from szlib.control.ways import (
+    ALIKE,
+    CELL,
+    IN_GROUP,
+    IN_ZONE,
+    KEEP,
+    TOGETHER,
+    Map,
+    Way,
+    WayFinder,
+    _cross_layers,
+    _Stamps,
+    find_target,
+)
+
+AHEAD = szlib.MPCSettings(lookahead=4.0, time_limit=np.inf)
+PLAIN = szlib.MPCSettings(time_limit=np.inf)
+AMONG = szlib.MPCSettings.among_people(r_robot=0.3, time_limit=np.inf)
+ROOM = [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0), (-3.0, -3.0)]
+BAR = [[(0.0, -2.0), (0.0, 2.0)]]
+DOORS = [[(0, -6), (0, -0.5)], [(0, 0.5), (0, 3.5)], [(0, 4.5), (0, 10)]]
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+ROUND = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
+START = (-3.0, 0.0, 0.0, 0.0)
+
+
+def random_walls(rng: np.random.Generator, n: int) -> Array:
+    middle, angle, half = (
+        rng.uniform(-4, 4, (n, 2)),
+        rng.uniform(0, np.pi, n),
+        rng.uniform(0.5, 3, n),
+    )
+    along = half[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.stack([middle - along, middle + along], axis=1)
+
+
+def length(route: Array) -> float:
+    return float(np.hypot(*np.diff(route, axis=0).T).sum()) if len(route) else np.inf
+
+
+def shortest(start: Array, goal: Array, boxes: shapely.Geometry) -> float:
+    """Length of the shortest way, from all pairs of all corners of the union of the boxes."""
+    points = np.array([start, goal, *shapely.get_coordinates(boxes)])
+    lines = shapely.linestrings(
+        np.stack(np.broadcast_arrays(points[:, None], points[None]), axis=2)
+    )
+    free = ~shapely.intersects(boxes.buffer(-1e-6, join_style="mitre"), lines)
+    return float(dijkstra(np.where(free, shapely.length(lines), 0.0), indices=0)[1])
+
+
+def drive(
+    controller: szlib.MPCCBF,
+    goal: tuple[float, float],
+    steps: int,
+    people: Any = (),
+    start: Any = START,
+    **more: object,
+) -> list[szlib.Step]:
+    state, taken = np.array(start), list[szlib.Step]()
+    for _ in range(steps):
+        taken.append(controller.step(state, goal, people, **more))
+        state = szlib.control.advance(state, taken[-1].control, 0.1)
+    return taken
+
+
+# --- around walls -----------------------------------------------------------------------------------
+
+
+def test_routes_are_free_of_walls_and_nearly_as_short_as_they_can_be() -> None:
+    rng, compared, around = np.random.default_rng(0), 0, 0
+    for _ in range(40):
+        walls, (start, goal) = (
+            random_walls(rng, int(rng.integers(1, 7))),
+            rng.uniform(-5, 5, (2, 2)),
+        )
+        near, far = (
+            shapely.union_all(
+                [shapely.LineString(w).buffer(d, quad_segs=16) for w in walls]
+            )
+            for d in (0.5 - CELL, 0.5 + 2 * CELL)
+        )
+        if shapely.contains_xy(far, *np.transpose([start, goal])).any():
+            continue
+        route = find_route(start, goal, walls, clearance=0.5)
+        assert length(route) <= 1.06 * shortest(start, goal, far) + CELL
+        assert length(route) >= shortest(start, goal, near) - 1e-9
+        if len(route):
+            assert (route[[0, -1]] == [start, goal]).all()
+            assert not shapely.LineString(route).intersects(near)
+        compared, around = compared + 1, around + (len(route) > 2)
+    assert compared > 15 and around > 5
+
+
+@pytest.mark.parametrize("size", [0.05, 0.4, 1.0, 2.0, 8.0])
+def test_the_box_of_a_wall_is_the_smallest_that_holds_all_places_so_near(size) -> None:
+    wall = Wall(0.0, 0.0, size, 0.0)
+    offset = 0.5 + wall.margin(AHEAD)
+    x, y = np.meshgrid(np.linspace(-3, size + 3, 1201), np.linspace(-3, 3, 1201))
+    inside = Wall.distance(x, y, 0.0, *wall.numbers) < offset
+    low, high = Wall.bounds(np.array([wall.numbers]), np.array([offset]))
+    edge = max(high[0, 1], high[0, 0] - size)
+    assert low[0] == pytest.approx([-edge, -edge])
+    reach = max(x[inside].max() - size, y[inside].max())
+    assert reach <= edge <= reach + 0.02
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("angle", np.linspace(0.05, 3.0, 12))
+def test_no_step_over_cells_crosses_a_wall(angle, clearance) -> None:
+    c, s = 4 * np.cos(angle), 4 * np.sin(angle)
+    wall = np.array([[(-c, -s), (c, s)]])
+    start, goal = (s, -c), (-s, c)
+    route = find_route(start, goal, wall, clearance=clearance)
+    assert not shapely.LineString(route).intersects(shapely.LineString(wall[0]))
+    assert length(route) > 2 * hypot(4, 4)
+
+
+def test_a_start_beside_a_wall_leaves_it_but_not_across_the_wall() -> None:
+    beside, behind = (-0.2, 0.0), (3.0, 0.0)
+    route = find_route(beside, behind, BAR, clearance=0.5)
+    assert not shapely.LineString(route).intersects(shapely.LineString(BAR[0]))
+    assert length(route) > 5.0
+
+
+def test_half_planes_and_a_users_obstacles_are_on_the_map() -> None:
+    class Table(szlib.control.Obstacle):
+        @staticmethod
+        def distance(x, y, t, px, py, radius):
+            return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - radius
+
+    items = [
+        HalfPlane((0.0, -2.0), (0.0, 1.0)),
+        Table(0.0, 0.0, 1.0),
+        Wall(-1, 3, 1, 3),
+    ]
+    fixed = Obstacles.of(items, PLAIN)
+    found = Map(fixed, np.array([(-3.0, 0.0), (3.0, 0.0)]))
+    cells = np.argwhere(np.ones(found.shape, bool))
+    h = fixed.h(*found.centers(cells).T).min(axis=0)
+    assert (found.free.ravel() == (h >= 0)).all()
+
+
+def test_times_to_the_goal_are_those_of_straight_ways_on_free_floor() -> None:
+    found = Map(Obstacles((), 0.5), np.array([(0.0, 0.0), (6.0, 2.0)]))
+    assert found.measure((0.0, 0.0), (6.0, 2.0), 2.0, np.zeros(found.shape))
+    centers = found.centers(np.argwhere(found.free))
+    straight = np.hypot(*(centers - found.centers(np.array(found.end))).T) / 2.0
+    far = found.far.ravel()
+    assert (far >= straight - 1e-9).all() and (far <= 1.03 * straight + 1e-9).all()
+
+
+def test_a_robot_goes_around_a_wall_only_with_a_finite_lookahead() -> None:
+    controller = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD)
+    steps = drive(controller, (3.0, 0.5), 120)
+    assert np.hypot(*(steps[-1].predicted[0, :2] - (3.0, 0.5))) < 0.1
+    assert all(step.safe and step.verify().ok for step in steps)
+    assert (
+        max(np.hypot(*(step.target - step.predicted[0, :2])) for step in steps)
+        <= 4.0 + 1e-9
+    )
+    assert np.max([np.hypot(*step.control) for step in steps]) > 0.5
+    plain = szlib.MPCCBF(ZONE, walls=BAR, settings=PLAIN)
+    stuck = drive(plain, (3.0, 0.5), 120)[-1]
+    assert stuck.predicted[0, 0] < 0 and (stuck.target == (3.0, 0.5)).all()
+    assert stuck.way == "" and stuck.ways == ()
+
+
+def test_without_walls_a_finite_lookahead_only_shortens_the_way_ahead() -> None:
+    step = szlib.MPCCBF(ZONE, settings=AHEAD).step(START, (7.0, 0.0))
+    assert step.target == pytest.approx((1.0, 0.0)) and step.way_length == 10.0
+    assert step.way == "straight to the goal"
+    step = szlib.MPCCBF(ZONE, settings=AHEAD).step(START, (0.5, 0.0))
+    assert step.target == pytest.approx((0.5, 0.0))
+
+
+def test_the_target_is_always_in_sight() -> None:
+    rng, around = np.random.default_rng(1), 0
+    for _ in range(30):
+        walls = random_walls(rng, 5)
+        at, goal = rng.uniform(-5, 5, (2, 2))
+        controller = szlib.MPCCBF(ZONE, walls=walls, settings=AHEAD)
+        if controller.barriers(at).min() < 0.1 or controller.goal_blocked(goal):
+            continue
+        step = controller.step((*at, 0.0, 0.0), goal)
+        if step.way_length < np.inf:
+            line = shapely.LineString([at, step.target])
+            assert all(not line.intersects(shapely.LineString(wall)) for wall in walls)
+            around += step.way_length > np.hypot(*(goal - at)) + 0.01
+    assert around > 3
+
+
+def test_in_a_closed_room_the_robot_goes_as_near_as_it_can_and_says_so() -> None:
+    assert find_route((0.0, 0.0), (8.0, 0.0), ROOM, clearance=0.5).shape == (0, 2)
+    controller = szlib.MPCCBF(ZONE, walls=ROOM, settings=AHEAD)
+    steps = drive(controller, (8.0, 0.0), 80, start=(0.0, 0.0, 0.0, 0.0))
+    assert steps[0].way_length == np.inf and steps[0].goal_blocked
+    assert "nearest point that it can reach" in steps[0].explain()
+    end = steps[-1].predicted[0]
+    assert end[:2] == pytest.approx((2.45, 0.0), abs=CELL)
+    assert np.hypot(*end[2:]) < 0.05
+
+
+def test_that_there_is_no_way_is_found_once(monkeypatch) -> None:
+    counted, measure = list[int](), Map.measure
+    monkeypatch.setattr(
+        Map, "measure", lambda *given: (counted.append(1), measure(*given))[1]
+    )
+    controller = szlib.MPCCBF(ZONE, walls=ROOM, settings=AHEAD)
+    drive(controller, (8.0, 0.0), 30, start=(0.0, 0.0, 0.0, 0.0))
+    assert len(counted) == 1
+    controller.step((0.0, 0.0, 0.0, 0.0), (8.0, 3.0))
+    assert len(counted) == 2
+
+
+def test_a_users_route_is_followed_to_the_goal() -> None:
+    detour = [(-3.0, 0.0), (-3.0, -4.0), (3.0, -4.0), (3.0, 0.0)]
+    for settings in (AHEAD, PLAIN, szlib.MPCSettings(lookahead=1.5)):
+        controller = szlib.MPCCBF(ZONE, walls=BAR, settings=settings)
+        steps = drive(controller, (3.0, 0.5), 200, route=detour)
+        places = np.array([step.predicted[0, :2] for step in steps])
+        assert np.hypot(*(places[-1] - (3.0, 0.5))) < 0.1
+        assert places[:, 1].min() < -2.5  # it takes the side that the route takes
+    assert steps[0].way_length == pytest.approx(4 + 6 + 4 + 0.5, abs=0.1)
+
+
+def test_a_route_out_of_sight_is_replaced_by_an_own_one() -> None:
+    controller = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD)
+    behind = controller.step(
+        (-1.0, 0.0, 0.0, 0.0), (3.0, 0.5), route=[(2.0, 0.5), (2.5, 0.5)]
+    )
+    own = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD).step(
+        (-1.0, 0.0, 0.0, 0.0), (3.0, 0.5)
+    )
+    assert (behind.target == own.target).all()
+
+
+def test_a_copy_takes_the_same_steps_and_a_reset_forgets_the_way() -> None:
+    people = [szlib.Person((0.0, 0.5), (-0.4, 0.0)), szlib.Person((1.0, -2.5))]
+    controller = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD)
+    first = drive(controller, (3.0, 0.0), 5, people)
+    copied = copy.copy(controller)
+    state = (-0.8, 0.3, 0.0, 0.0)
+    for _ in range(6):
+        one, other = (c.step(state, (3.0, 0.0), people) for c in (controller, copied))
+        assert (one.control == other.control).all() and one.way == other.way
+    controller.reset()
+    again = drive(controller, (3.0, 0.0), 5, people)
+    assert all(
+        (a.control == b.control).all() for a, b in zip(first, again, strict=True)
+    )
+
+
+def test_new_walls_and_a_new_goal_give_a_new_way() -> None:
+    controller = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD)
+    assert controller.step(START, (3.0, 0.0)).way_length > 6.5
+    assert controller.step(START, (-3.0, 3.0)).way_length == pytest.approx(3.0)
+    controller.set_walls([])
+    assert controller.step(START, (3.0, 0.0)).way_length == pytest.approx(6.0)
+
+
+def test_a_route_that_is_none_is_refused() -> None:
+    with pytest.raises(szlib.SolverError, match="route"):
+        szlib.MPCCBF(ZONE).step(START, (3.0, 0.0), route=[1.0, 2.0, 3.0])
+    with pytest.raises(szlib.SolverError, match="clearance"):
+        find_route((0.0, 0.0), (1.0, 0.0), BAR, clearance=-1.0)
+
+
+def test_a_wall_of_short_pieces_keeps_its_clearance() -> None:
+    pieces = [[(1.03, a), (1.03, a + 0.05)] for a in np.arange(-1, 1, 0.05)]
+    for clearance in (0.1, 0.3):
+        route = find_route((0.0, 0.0), (2.0, 0.0), pieces, clearance)
+        gap = shapely.LineString(route).distance(
+            shapely.LineString([(1.03, -1), (1.03, 1)])
+        )
+        assert gap > clearance - CELL
+
+
+@pytest.mark.parametrize("goal", [(3000.0, 3000.0), (1e5, -1e5)])
+def test_a_goal_far_away_is_headed_for(goal) -> None:
+    steps = drive(szlib.MPCCBF(ZONE, settings=AHEAD), goal, 15, start=(0, 0, 0, 0))
+    assert np.hypot(*steps[-1].predicted[0, :2]) > 0.5
+    assert (steps[-1].predicted[0, :2] * np.sign(goal) > 0).all()
+
+
+def test_a_door_of_a_large_building_stays_open() -> None:
+    """Of a building that has too many cells the map is the part around robot and goal."""
+    rows = [[(4, -200), (4, -0.7)], [(4, 0.7), (4, 200)], [(-200, 200), (200, 204)]]
+    step = szlib.MPCCBF(ZONE, walls=rows, settings=AHEAD).step((0, 0, 0, 0), (9.0, 0.0))
+    assert step.way_length == pytest.approx(9.0, abs=0.2) and not step.goal_blocked
+
+
+def test_a_robot_that_was_moved_to_another_room_looks_for_its_way_anew() -> None:
+    walls = [*zip(ROOM, ROOM[1:], strict=False)]
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=AHEAD)
+    inside, outside = (0.0, 0.0, 0.0, 0.0), (-6.0, 0.0, 0.0, 0.0)
+    for state, length in ((outside, 2.0), (inside, np.inf), (outside, 2.0)):
+        for _ in range(5):
+            step = controller.step(state, (-8.0, 0.0))
+        assert step.way_length == pytest.approx(length)
+        assert (step.way == "straight to the goal") == (length < np.inf)
+
+
+def test_own_ways_and_given_routes_may_take_turns() -> None:
+    controller = szlib.MPCCBF(ZONE, settings=AHEAD)
+    controller.step((0, 0, 0, 0), (4.0, 0.0))
+    controller.step((0, 0, 0, 0), (-60.0, -40.0), route=[(0.0, 0.0), (-60.0, -40.0)])
+    for x in np.linspace(0.0, 3.5, 8):
+        controller.step((x, 0, 0, 0), (4.0, 0.0), route=[(0.0, 0.0), (4.0, 0.0)])
+    step = controller.step((3.5, 0, 0, 0), (4.0, 0.0))
+    assert step.ways[0].points[0] == pytest.approx((3.5, 0.0))
+
+
+def test_a_goal_that_walks_away_leaves_the_map() -> None:
+    controller = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD)
+    for k in range(140):
+        step = controller.step((-3.0, 0, 0, 0), (-4 - 0.1 * k, 0.0))
+        assert step.target == pytest.approx((max(-7.0, -4 - 0.1 * k), 0.0), abs=0.5)
+
+
+@pytest.mark.parametrize("radius", [0.05, 0.1])
+def test_targets_of_small_robots_lie_on_this_side_of_thin_walls(radius) -> None:
+    rng = np.random.default_rng(2)
+    s = szlib.MPCSettings.among_people(r_robot=radius, eps=0.03)
+    for _ in range(25):
+        angle = rng.uniform(0, pi)
+        end = 3 * np.array([cos(angle), sin(angle)])
+        at = rng.uniform(-1, 1, 2)
+        controller = szlib.MPCCBF(ZONE, walls=[[-end, end]], settings=s)
+        if controller.barriers(at).min() < 0:
+            continue
+        step = controller.step((*at, 0, 0), tuple(-at * 2))
+        line = shapely.LineString([at, step.target])
+        assert not line.intersects(shapely.LineString([-end, end]))
+
+
+def test_a_route_of_a_wrong_shape_is_refused() -> None:
+    with pytest.raises(szlib.SolverError, match=r"route.*shape \(m, 2\)"):
+        szlib.MPCCBF(ZONE).step(START, (3.0, 0.0), route=np.zeros((2, 2, 2)))
+
+
+def test_obstacles_without_bounds_are_measured_in_parts(monkeypatch) -> None:
+    items = [HalfPlane((0.0, -2.0 - k), (0.1, 1.0)) for k in range(5)]
+    fixed, points = Obstacles.of(items, PLAIN), np.array([(-3.0, 0.0), (3.0, 0.0)])
+    whole = Map(fixed, points)
+    monkeypatch.setattr("szlib.control.ways._CHUNK", 1000)
+    assert (Map(fixed, points).free == whole.free).all()
+
+
+# --- through space and time -------------------------------------------------------------------------
+
+
+def test_the_search_finds_the_cheapest_way_of_all() -> None:
+    """Against Dijkstra's algorithm on the graph of all cells at all times."""
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        costs = rng.choice([0.1, 0.3, 5.0, np.inf], (7, 5, 6), p=[0.5, 0.2, 0.2, 0.1])
+        far, begin = rng.uniform(0, 1, (5, 6)), (2, 3)
+        costs[:, 2, 3] = 0.2
+        number = np.arange(8 * 30).reshape(8, 5, 6)
+        rows = []
+        for k, i, j in np.ndindex(7, 5, 6):
+            for a, b in np.ndindex(3, 3):
+                to = i + a - 1, j + b - 1
+                if 0 <= to[0] < 5 and 0 <= to[1] < 6 and np.isfinite(costs[k, *to]):
+                    price = costs[k, *to] + 0.015 * (abs(a - 1) + abs(b - 1))
+                    rows.append((price, number[k, i, j], number[k + 1, *to]))
+        price, start, end = map(np.array, zip(*rows, strict=True))
+        graph = coo_array((price, (start, end)), shape=(240, 240)).tocsr()
+        reached = dijkstra(graph, indices=number[0, 2, 3])[number] + far
+        reached[:-1, 1:-1, 1:-1] = np.inf  # inside it goes on to the end
+        cells = _cross_layers(costs.astype(np.float32), begin, far)
+        moves = np.abs(np.diff(cells, axis=0))
+        k = len(moves)
+        found = costs[np.arange(k), *cells[1:].T].sum() + 0.015 * moves.sum()
+        assert moves.max() <= 1 and tuple(cells[0]) == begin
+        assert found + far[tuple(cells[-1])] == pytest.approx(reached.min(), abs=1e-5)
+
+
+def side_by_side(n: int, apart: float = 0.6, x: float = 0.0) -> list[szlib.Person]:
+    return [szlib.Person((x, (i - (n - 1) / 2) * apart)) for i in range(n)]
+
+
+@pytest.mark.parametrize("n", [3, 5])
+def test_a_row_of_people_is_passed_on_either_side(n) -> None:
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
+    steps = drive(controller, (4.0, 0.0), 130, side_by_side(n), (-4.0, 0.0, 0.0, 0.0))
+    assert np.hypot(*(steps[-1].predicted[0, :2] - (4.0, 0.0))) < 0.1
+    last = n - 1
+    sides = {f"{side} of person {i}" for side, i in (("left", last), ("right", 0))}
+    assert {way.name.split(", ")[0] for way in steps[0].ways} | sides
+    assert len(steps[0].ways) >= 2
+    across = [np.interp(0.0, *way.points[:60].T) for way in steps[0].ways[:2]]
+    assert min(across) < -0.3 * n and max(across) > 0.3 * n
+
+
+def test_a_second_door_is_taken_where_a_person_stands_in_the_first() -> None:
+    controller = szlib.MPCCBF(ROUND, walls=DOORS, settings=AMONG)
+    start = (-4.0, 0.0, 0.0, 0.0)
+    steps = drive(controller, (4.0, 0.0), 160, [szlib.Person((0.0, 0.0))], start)
+    places = np.array([step.predicted[0, :2] for step in steps])
+    assert np.hypot(*(places[-1] - (4.0, 0.0))) < 0.1
+    assert np.interp(0.0, *places.T) == pytest.approx(4.0, abs=0.3)
+    assert all(step.walls_safe and step.passively_safe for step in steps)
+    alone = drive(szlib.MPCCBF(ROUND, walls=DOORS, settings=AMONG), (4.0, 0.0), 3)
+    assert np.abs(alone[0].ways[0].points[:, 1]).max() < 0.5
+
+
+def test_the_robot_waits_at_the_only_door_and_then_goes_on() -> None:
+    walls = [(0, 0.6), (0, 6), (-8, 6), (-8, -6), (0, -6), (0, -0.6)]  # a room
+    controller = szlib.MPCCBF(ROUND, walls=walls, settings=AMONG)
+    state, walking = np.array([-4.0, 0.0, 0.0, 0.0]), [[0.0, 0.0, 0.0, 0.0]]
+    for _ in range(100):
+        step = controller.step(state, (4.0, 0.0), walking)
+        state = szlib.control.advance(state, step.control, 0.1)
+    assert state[0] < -0.5 and np.hypot(*state[2:]) < 0.05
+    for _ in range(90):
+        state = szlib.control.advance(
+            state, controller.step(state, (4.0, 0.0)).control, 0.1
+        )
+    assert state[:2] == pytest.approx((4.0, 0.0), abs=0.1)
+
+
+@pytest.mark.parametrize("turn", [0.0, pi / 2, pi])
+def test_ways_pass_in_front_of_or_behind_a_person_who_crosses(turn) -> None:
+    def turned(x: float, y: float) -> tuple[float, float]:
+        return x * cos(turn) - y * sin(turn), x * sin(turn) + y * cos(turn)
+
+    person = szlib.Person(turned(0.0, -3.0), turned(0.0, 1.0))
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
+    at, goal = turned(-3.0, 0.0), turned(5.0, 0.0)
+    steps = [controller.step((*at, 0.0, 0.0), goal, [person])]
+    names = {way.name for way in steps[0].ways}
+    assert any("behind person 0" in name for name in names)
+    explained = steps[0].explain()
+    assert f"way: {steps[0].way}" in explained
+    for other in steps[0].ways[1:]:
+        assert f"not: {other.name}" in explained
+
+
+@pytest.mark.parametrize(("side", "sign"), [("right", -1), ("left", 1)])
+def test_a_person_met_head_on_is_passed_on_the_preferred_side(side, sign) -> None:
+    settings = szlib.MPCSettings.among_people(pass_side=side, r_robot=0.3)
+    person = [szlib.Person((3.0, 0.0), (-1.0, 0.0))]
+    step = szlib.MPCCBF(ROUND, settings=settings).step(START, (7.0, 0.0), person)
+    assert sign * step.target[1] > 0.1 and step.way == f"{side} of person 0"
+
+
+def test_a_way_is_kept_until_another_is_clearly_cheaper() -> None:
+    """A person who stands in the way steps aside, little by little: the robot changes the side once."""
+    finder = WayFinder(Obstacles((), 0.3), AMONG)
+    sides = list[float]()
+    for y in np.linspace(-0.8, 0.8, 41):
+        person = szlib.Person((0.0, float(y)))
+        numbers = Zone.place(ROUND, person.position, 0.0, person.velocity)
+        zones = Obstacles.of([Zone(*numbers)], AMONG)
+        for _ in range(4):
+            found = finder.find((-3.0, 0.0), (3.0, 0.0), zones)
+        way = found.ways[0]
+        sides.append(np.sign(np.interp(0.0, *way.points.T) - y))
+        assert way.cost < min(each.cost for each in found.ways) + KEEP
+    assert sides[0] > 0 > sides[-1]
+    changes = np.flatnonzero(np.diff(sides))
+    assert len(changes) == 1 and np.linspace(-0.8, 0.8, 41)[changes[0]] > 0.05
+
+
+def test_a_zone_is_crossed_only_where_the_way_around_costs_more() -> None:
+    """A corridor with a person: through the zone costs `IN_ZONE` a second."""
+    walls = [[(-9, -1.4), (9, -1.4)], [(-9, 1.4), (9, 1.4)]]
+    for walls_here, crosses in (((), False), (walls, True)):
+        controller = szlib.MPCCBF(ROUND, walls=walls_here, settings=AMONG)
+        step = controller.step(START, (3.0, 0.0), [szlib.Person((0.0, 0.0))])
+        points = step.ways[0].points
+        inside = np.hypot(*points.T) < 0.8 + 0.3
+        assert inside.any() == crosses
+        assert step.ways[0].cost == pytest.approx(
+            step.ways[0].times[-1] + IN_ZONE * 0.15 * inside.sum() * crosses, rel=0.2
+        )
+
+
+@pytest.mark.parametrize("rates", [(0.0, 0.0), (1.0, 1.2), (1.0, -1.0)])
+@pytest.mark.parametrize("apart", [1.4, 1.6])
+def test_between_two_people_who_are_together_a_way_has_its_price(apart, rates) -> None:
+    people = [
+        szlib.Person((0.0, side * apart / 2), (rate, 0.0))
+        for side, rate in zip((-1, 1), rates, strict=True)
+    ]
+    zones = Obstacles.of(
+        [Zone(*Zone.place(ROUND, p.position, 0.0, p.velocity)) for p in people], AMONG
+    )
+    stamps, price = _Stamps(zones, 0.1, AMONG), np.zeros((1, 60, 60))
+    stamps.add(
+        price, np.arange(len(stamps.rows)), np.array([2.0]), np.array([-3.0, -3])
+    )
+    places = -3.0 + 0.1 * (np.argwhere(price[0] == IN_GROUP) + 0.5)
+    is_group = apart < TOGETHER and abs(rates[0] - rates[1]) < ALIKE
+    assert len(stamps.rows) == 2 + is_group and (len(places) > 0) == is_group
+    if is_group:
+        middle = 2.0 * sum(rates) / 2
+        assert np.hypot(*(places - (middle, 0.0)).T).max() < apart / 2 + 0.15
+
+
+def test_the_first_door_is_named_and_nobody_is_waited_for_at_the_goal() -> None:
+    walls = [
+        [(x, y), (x, 5 * np.sign(y))] for x in (2.0, 5.0) for y in (-0.62, 0.62)
+    ] + [[(-4, y), (9, y)] for y in (-5, 5)]
+    step = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG).step(START, (8.0, 0.0))
+    x, y = map(float, step.way.split("(")[1].rstrip(")").split(","))
+    assert (x, y) == pytest.approx((2.0, 0.0), abs=0.3)
+    leaves = [szlib.Person((-3.0, 1.5), (-0.5, 0.0))]
+    step = szlib.MPCCBF(ROUND, settings=AMONG).step((0, 0, 0, 0), (1.5, 0.0), leaves)
+    assert step.way == "straight to the goal"
+
+
+def test_a_plan_whose_floors_all_hold_is_no_restart() -> None:
+    """Few iterations: the first problem is not solved, the one with floors is."""
+    settings = szlib.MPCSettings(dt=0.3, max_iterations=3)
+    controller = szlib.MPCCBF(ZONE, walls=[[(-3, 1.5), (4, 1.5)]], settings=settings)
+    people = [
+        szlib.Person((-0.59059844, 0.97353498), (0.00417197, 1.79574451)),
+        szlib.Person((-0.66370339, 0.1403039), (0.91678956, -1.23668284)),
+    ]
+    state = (-1.8798728, -0.88716361, 0.14008909, -0.30287018)
+    assert controller.step(state, (4.0, 0.0), people).status in szlib.control.STATUSES
+
+
+def test_a_way_stays_at_the_goal() -> None:
+    way = Way(np.array([(0.0, 0.0), (2.0, 0.0)]), np.array([0.0, 2.0]), 2.0)
+    assert way.at(np.array([0.5, 2.0, 9.0])).tolist() == [[0.5, 0], [2, 0], [2, 0]]
+
+
+# --- people who are met head-on ---------------------------------------------------------------------
+
+CIRCLE = szlib.Ellipse((0.0, 0.0), (0.7, 0.7))
+
+
+def place(person: szlib.Person, zone: szlib.Ellipse) -> tuple[float, ...]:
+    return Zone.place(zone, person.position, person.heading or 0.0, person.velocity)
+
+
+def stand_still(rows: Any, settings: szlib.MPCSettings) -> Obstacles:
+    """Walls (xa, ya, xb, yb)."""
+    return Obstacles.of([Wall(*row) for row in rows], settings)
+
+
+STANDING = place(szlib.Person((0.0, 0.0), heading=pi), CIRCLE)
+ROBOT = (-3.0, 0.0)
+
+
+def find_turn(bearing: float, settings: szlib.MPCSettings) -> float:
+    """Angle from the goal, 8 m away at a `bearing`, to the target [rad], both seen from the robot."""
+    goal = (ROBOT[0] + 8 * cos(bearing), ROBOT[1] + 8 * sin(bearing))
+    x, y = find_target(ROBOT, goal, [STANDING], stand_still([], settings), settings)
+    assert np.hypot(x - ROBOT[0], y - ROBOT[1]) == pytest.approx(8), (
+        "as far away as the goal"
+    )
+    return atan2(y - ROBOT[1], x - ROBOT[0]) - bearing
+
+
+def half_angle(settings: szlib.MPCSettings) -> float:
+    """Half the angle under which the robot sees the set h < 0 of a round zone."""
+    return asin((0.7 + settings.r_robot + settings.eps) / 3)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.5])
+@pytest.mark.parametrize(("side", "sign"), [("right", -1), ("left", 1)])
+def test_the_target_lies_along_the_tangent_and_turns_back_without_a_jump(
+    side, sign, share
+):
+    settings = szlib.MPCSettings(pass_side=side, head_on_share=share)
+    w = half_angle(settings)
+    leads = np.linspace(-0.999, 2.5, 400)
+    turns = sign * np.array(
+        [find_turn(sign * lead * share * w, settings) for lead in leads]
+    )
+    expected = (w - leads * share * w) * np.clip(2 - leads, 0, 1)
+    assert turns == pytest.approx(expected, abs=1e-9)
+    assert np.abs(np.diff(turns)).max() < 2 * w * (leads[1] - leads[0]), (
+        "without a jump"
+    )
+
+
+def test_the_robot_passes_on_the_other_side_if_the_goal_lies_there() -> None:
+    settings = szlib.MPCSettings(pass_side="right")
+    limit = settings.head_on_share * half_angle(settings)
+    assert find_turn(0.99 * limit, settings) < 0 < find_turn(1.01 * limit, settings)
+    assert find_turn(2.01 * limit, settings) == pytest.approx(0)
+
+
+def test_a_person_who_walks_across_does_not_hide_one_ahead() -> None:
+    across = place(szlib.Person((-1.0, -3.0), (0.0, 1.0)), CIRCLE)
+    s = szlib.MPCSettings(head_on_share=0.25)
+    empty = stand_still([], s)
+    alone = find_target(ROBOT, (5.0, 0.0), [STANDING], empty, s)
+    assert (
+        find_target(ROBOT, (5.0, 0.0), [across, STANDING], empty, s)
+        == alone
+        != (5.0, 0.0)
+    )
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("walls", [(), (-1.6,), (1.6,), (-2.2, 2.2), (-1.6, 1.6)])
+def test_the_target_moves_and_turns_with_the_scene(side, walls):
+    settings = szlib.MPCSettings(pass_side=side)
+    zone = szlib.Ellipse((0.1, 0.05), (0.8, 0.6), 0.3)
+
+    def find(angle, shift):
+        def move(x, y):
+            return x * cos(angle) - y * sin(angle) + shift[0], x * sin(angle) + y * cos(
+                angle
+            ) + shift[1]
+
+        person = szlib.Person(move(0.0, 0.0), heading=pi + angle)
+        rows = [(*move(-9.0, y), *move(9.0, y)) for y in walls]
+        fixed = stand_still(rows, settings)
+        robot, goal = move(*ROBOT), move(5.0, 0.0)
+        x, y = np.subtract(
+            find_target(robot, goal, [place(person, zone)], fixed, settings), shift
+        )
+        return x * cos(angle) + y * sin(angle), y * cos(angle) - x * sin(angle)
+
+    expected = find(0.0, (0.0, 0.0))
+    assert find(0.0, (30.0, -20.0)) == pytest.approx(expected)
+    assert find(2.3, (-4.0, 7.0)) == pytest.approx(expected)
+    free = {"right": -1.6 not in walls, "left": 1.6 not in walls}
+    other = "left" if side == "right" else "right"
+    passed = side if free[side] else other if free[other] else "none"
+    assert np.sign(expected[1]) == {"right": -1, "left": 1, "none": 0}[passed]
+
+
+@pytest.mark.parametrize("turned", [0.0, pi / 2])
+@pytest.mark.parametrize(("more", "is_free"), [(-0.01, False), (0.01, True)])
+def test_a_side_is_free_if_the_robot_fits_between_the_zone_and_the_wall(
+    turned, more, is_free
+):
+    """Beside the set h < 0 of an ellipse the robot's disc needs its radius and the wall's margin."""
+    settings = szlib.MPCSettings(pass_side="right")
+    zone = szlib.Ellipse((0.0, 0.0), (1.0, 0.6), turned)
+    person = place(szlib.Person((0.0, 0.0), heading=pi), zone)
+    reach = 1.0 + settings.r_robot + settings.eps
+    widest = reach if turned else np.sqrt(reach**2 - 1.0**2 + 0.6**2)
+    y = -(widest + settings.r_robot + settings.eps + more)
+    wall = stand_still([(-50.0, y, 50.0, y)], settings)
+    target = find_target(ROBOT, (4.0, 0.0), [person], wall, settings)
+    assert (target[1] < 0) == is_free
+    assert target[1] != 0, "otherwise it passes on the left"
+
+
+@pytest.mark.parametrize("end", [-1.89, -1.91])
+@pytest.mark.parametrize("shift", [0.0, 0.5, -7.3])
+def test_a_wall_that_just_reaches_into_the_space_makes_the_side_not_free(end, shift):
+    """A wall 1 m long, end on; 1.4 m beside the person's centre the disc passes 0.5 m from it."""
+    settings = szlib.MPCSettings(pass_side="right")
+    zone = szlib.Ellipse((0.0, 0.0), (0.85, 0.85))
+    person = place(szlib.Person((shift, shift), heading=pi), zone)
+    wall = (shift - 0.05, shift + end, shift - 0.05, shift + end - 1.0)
+    target = find_target(
+        (shift - 3.0, shift),
+        (shift + 4.0, shift),
+        [person],
+        stand_still([wall], settings),
+        settings,
+    )
+    assert (target[1] > shift) == (end == -1.89)
