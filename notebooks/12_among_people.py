@@ -212,12 +212,14 @@ Markdown(
 # %% [markdown]
 # ## Ways among people
 #
-# Who walks is somewhere else when the robot comes. So the map near the robot has a third axis, *time*: one
+# People who walk are somewhere else when the robot comes. So the map near the robot has a third axis, *time*: one
 # layer of cells for each moment of the next 6 s, with people where they will be then if they keep their
 # velocity. From layer to layer the robot goes to a neighbour, or waits. A second has a price:
 
 # %%
-print(f"a second costs 1 s, and {ways.IN_ZONE:g} s more in a zone, and {ways.IN_BODY:g} s more in a body")
+print(
+    f"a second costs 1 s, and {ways.ZONE_SECOND:g} s more in a zone, and {ways.BODY_SECOND:g} s more in a body"
+)
 
 # %% [markdown]
 # **A number first.** Somebody stands in a door, and a second door makes the way 6 m longer. At 1 m/s that
@@ -279,8 +281,8 @@ said = [f"- {name}: {step.way}; {step.ways[0].cost:.1f} s" for name, step in ste
 Markdown(
     "<details><summary>Answer</summary>\n\n"
     + "\n".join(said)
-    + "\n\nBy default a person whom the robot meets is passed on the right (`pass_side`): the other side costs "
-    f"{ways.OTHER_SIDE:g} s more for each of them.\n\n</details>"
+    + "\n\nBy default people whom the robot meets are passed on the right (`pass_side`): the other side costs "
+    f"{ways.SIDE_PRICE:g} s more.\n\n</details>"
 )
 
 # %% [markdown]
@@ -330,7 +332,7 @@ record.check(what, whole, f"{(between / 360).round().to_numpy().astype(int).toli
 #
 # **A robot that cannot decide.** Somebody stands to the right of the way, and shifts from one foot
 # to the other, by 0.3 m. Now the left is cheaper, now the right. A robot that always takes the cheapest way
-# goes to and fro. szlib's robot keeps its way until another one is `KEEP` = 1 s cheaper. This is
+# goes to and fro. szlib's robot keeps its way until another one is `SWITCH_GAIN` = 1 s cheaper. This is
 # *hysteresis*, as in a thermostat.
 #
 # **What do you think?** How often does each robot change its mind in 12 s?
@@ -340,8 +342,8 @@ record.check(what, whole, f"{(between / 360).round().to_numpy().astype(int).toli
 from unittest.mock import patch
 
 instants, sides = among.dt * np.arange(120), {}
-for keep in (0.0, ways.KEEP):
-    with patch.object(ways, "KEEP", keep):
+for keep in (0.0, ways.SWITCH_GAIN):
+    with patch.object(ways, "SWITCH_GAIN", keep):
         robot, sides[keep] = szlib.MPCCBF(zone, settings=among), []
         for t in instants.tolist():
             person = szlib.Person((3.0, -0.9 + 0.3 * np.sin(2 * np.pi * t / 3)), heading=np.pi)
@@ -351,16 +353,20 @@ changes = {keep: int(np.abs(np.diff(each)).sum()) for keep, each in sides.items(
 fig, ax = plt.subplots(figsize=(8, 2.4), layout="constrained")
 for (keep, each), style in zip(sides.items(), ("--", "-"), strict=True):
     colour = figures.ORANGE if style == "--" else figures.BLUE
-    ax.step(instants, each, style, color=colour, label=f"KEEP = {keep:g} s", where="post")
+    ax.step(instants, each, style, color=colour, label=f"SWITCH_GAIN = {keep:g} s", where="post")
 ax.set(xlabel="time [s]", yticks=[0, 1], yticklabels=["right", "left"], ylabel="side", ylim=(-0.2, 1.2))
-ax.set_title("Changes of side in 12 s: " + ", ".join(f"{n} with KEEP = {k:g} s" for k, n in changes.items()))
+ax.set_title(
+    "Changes of side in 12 s: " + ", ".join(f"{n} with SWITCH_GAIN = {k:g} s" for k, n in changes.items())
+)
 ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 record.figure(fig, "hysteresis")
 
 # %% jupyter={"source_hidden": true}
 # Checks, and two doors
 what = "a robot that keeps its way changes its mind less often"
-record.check(what, changes[ways.KEEP] < changes[0.0], f"{changes[ways.KEEP]} and {changes[0.0]} changes")
+record.check(
+    what, changes[ways.SWITCH_GAIN] < changes[0.0], f"{changes[ways.SWITCH_GAIN]} and {changes[0.0]} changes"
+)
 doors = drive_both((8.0, 0.0), near_door, two_doors)
 fig, ax = plt.subplots(figsize=(6, 4.8), layout="constrained")
 figures.plot_robot_paths(doors, ax=ax).get_legend().remove()
@@ -447,7 +453,7 @@ Markdown(
     f"would go on. The other two pass between two people, in {usual['time_to_goal']:.1f} s and "
     f"{through['time_to_goal']:.1f} s. They enter a zone for {among.dt * entered:.1f} s and "
     f"{among.dt * through['violations']:.1f} s, keep {wide:.2f} m from the nearest body, and report these steps as "
-    f"not safe. Their search pays {ways.IN_ZONE:g} s for a second in a zone, and a plan that begins along this way "
+    f"not safe. Their search pays {ways.ZONE_SECOND:g} s for a second in a zone, and a plan that begins along this way "
     "finds the gap.\n\n</details>"
 )
 

@@ -79,7 +79,7 @@ fig = meetings.draw_outcomes(outcomes)
 good = outcomes[outcomes["outcome"] == "arrives, enters no zone"]["controller"].value_counts()
 rivals = max(good.get(name, 0) for name in CONTROLLERS if name != "MPC-CBF")
 fig.suptitle(
-    f"MPC-CBF arrives without entering a zone in {good['MPC-CBF']} of 11 meetings, its rivals in at most {rivals}"
+    f"MPC-CBF arrives without entering a zone in {good['MPC-CBF']} of 11 meetings, simple controllers in at most {rivals}"
 )
 record.figure(fig, "outcomes")
 
@@ -112,8 +112,9 @@ for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
     ax.set(xlim=(-7.5, 7.5), ylim=(-5, 6), xticks=(-5, 0, 5), xlabel="x [m]" if ax in grid[-1] else "")
     ax.set_ylabel("y [m]" if ax in grid[:, 0] else "")
 handles, names = grid[0, 1].get_legend_handles_labels()
+known = dict(zip(names, handles, strict=True))  # there are two walls
 grid.flat[-1].axis("off")
-grid.flat[-1].legend(handles, names, loc="center", fontsize=12)
+grid.flat[-1].legend(known.values(), known, loc="center", fontsize=12)
 lengths = {name: log.metrics()["path_length"] for name, log in logs.items()}
 least = min(log.h.min() for log in logs.values())
 farthest = max(lengths, key=lengths.get)

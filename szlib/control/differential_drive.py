@@ -279,12 +279,14 @@ class _Point(MPCCBF):
     wheels: _Wheels
     own: Array  # state of the robot at this step
 
-    def _head(self, scene: Scene, goal: Point, route: ArrayLike | None) -> Heading:
+    def _choose_heading(
+        self, scene: Scene, goal: Point, route: ArrayLike | None
+    ) -> Heading:
         """As of `MPCCBF`, but straight to a `goal` so close that no wall lies between, as in a turn."""
         away = dist(scene.state[:2], goal)
         if away < self.settings.r_robot and not scene.tracked.unknown:
             return Heading(goal, away)
-        return super()._head(scene, goal, route)
+        return super()._choose_heading(scene, goal, route)
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc whose wheels follow the point on a `path`."""

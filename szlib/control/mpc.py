@@ -270,7 +270,7 @@ class MPCCBF(Controller):
             x = clock.bring_forward(self.robot, np.array(x), age, np.zeros(2)).tolist()
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._make_scene(x, towards, tracked, self._find_near(*x))
-        heading = self._head(scene, towards, route)
+        heading = self._choose_heading(scene, towards, route)
         way = heading.length
         remaining = way if way < inf else dist(x[:2], towards)
         self._planner.budget.begin(began)
@@ -475,7 +475,9 @@ class MPCCBF(Controller):
             near,
         )
 
-    def _head(self, scene: Scene, goal: Point, route: ArrayLike | None) -> Heading:
+    def _choose_heading(
+        self, scene: Scene, goal: Point, route: ArrayLike | None
+    ) -> Heading:
         """Where the plan heads; among unknown people, where full braking ends."""
         s, (x, y, vx, vy) = self.settings, scene.state
         at, found = (x, y), None

@@ -10,7 +10,7 @@ turns by about 2 pi more than the other (their winding numbers differ). In front
 walks are different sides, too. An optimiser that improves a plan in small steps never changes the side: each
 side needs a plan of its own. The next way is found where places near the ways before have a price.
 
-The robot keeps its way until another one is `KEEP` cheaper, so that it does not dither (hysteresis).
+The robot keeps its way until another one is `SWITCH_GAIN` cheaper, so that it does not dither (hysteresis).
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ CELL = 0.15
 """Side of a cell [m] (assumed)."""
 MOST_CELLS = 250_000
 """Number of cells of a map; those of a larger one are larger (assumed)."""
-WINDOW, AHEAD = 4.0, 6.0
+SEARCH_RADIUS, SEARCH_TIME = 4.0, 6.0
 """How far the search looks, from the robot [m], and in time [s] (assumed)."""
-EVERY = 0.4
+SEARCH_INTERVAL = 0.4
 """Time between two searches, rounded up to whole steps [s] (assumed)."""
-IN_ZONE, IN_BODY, AGAIN = 2.0, 100.0, 1.5
+ZONE_SECOND, BODY_SECOND, REPEAT_SECOND = 2.0, 100.0, 1.5
 """Price of a second in a zone, in a body, and near a way that was found before [s] (assumed)."""
-OTHER_SIDE = 0.5
+SIDE_PRICE = 0.5
 """Price of meeting people head-on, and passing on the side that is not `pass_side` [s] (assumed)."""
-IN_GROUP, TOGETHER, ALIKE = 4.0, 1.5, 0.3
+GROUP_SECOND, GROUP_DISTANCE, GROUP_SPEED = 4.0, 1.5, 0.3
 """Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed)."""
-KEEP = 1.0
+SWITCH_GAIN = 1.0
 """A way is kept until another one is this much cheaper [s] (assumed)."""
 MOST_WAYS = 3
 """Number of ways that are looked for (assumed)."""
@@ -61,18 +61,20 @@ _CHUNK = 1_000_000  # cells that are measured at once
 _PEOPLE = 10.0  # people who are farther from the robot than this are left out [m]
 # places of people who stand are rounded so, and a goal is the same if it moved less [m]
 _MOVED, _GOAL_MOVED = 0.3, 0.5
-_TUBE = 0.45  # places that are nearer to a way than this are near it [m]
+_NEAR_WAY = 0.45  # places that are nearer to a way than this are near it [m]
 _PLACES = 48  # of what is fixed, around which turns are measured
 _MOST_SHARE = 1.2  # least offset of obstacles, in cells: no step leads across a wall
 _NEIGHBOURS = (0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)
-_STEP = 0.015  # price of a step to a neighbour: a robot that waits stands still [s]
-_BESIDE = 2.5  # people who are passed nearer than this are named [m]
+_MOVE_PRICE = (
+    0.015  # price of a step to a neighbour: a robot that waits stands still [s]
+)
+_NAMED_WITHIN = 2.5  # people who are passed nearer than this are named [m]
 _DOOR = 0.6  # a door has less room than this on both sides, and more so far before and behind [m]
 _NAMED = 3  # largest number of parts of a name
-_WAITS = 8  # tenths of a second of rest that are called waiting
+_WAITING = 8  # tenths of a second of rest that are called waiting
 # where free space is looked for, from a zone's centre to where the robot passes
 _ALONG = np.linspace(0, 1, 20)
-_STEPS = np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
+_MOVES = np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
 
 
 class Way(NamedTuple):
@@ -80,7 +82,7 @@ class Way(NamedTuple):
 
     Attributes
     ----------
-    points : from where the robot was when the way was found, at most `EVERY` ago, shape (k, 2) [m].
+    points : from where the robot was when the way was found, at most `SEARCH_INTERVAL` ago, shape (k, 2) [m].
     times : when the robot is there, from then on, shape (k,) [s].
     cost : time to the end, and the prices on the way [s].
     name : in words, such as "left of person 3, behind person 5".
@@ -127,7 +129,7 @@ class Map:
     ----------
     free : whether h >= 0 in the centre of a cell, shape (nx, ny).
     price : of a second in a cell, because of people who stand [s].
-    far : time to the goal [s]; inf without a way.
+    seconds_to_goal : from the centre of a cell [s]; inf without a way.
     """
 
     def __init__(self, fixed: Obstacles, points: Array, cell: float = CELL) -> None:
@@ -234,18 +236,20 @@ class Map:
         graph = coo_array((weights, (i, j)), shape=(n, n)).tocsr()
         end = self.find_cell(goal)
         self._measure_from(graph, end)
-        if reached := bool(np.isfinite(self.far[at])):
-            return reached
+        if np.isfinite(self.seconds_to_goal[at]):
+            return True
         self._measure_from(graph, at)
-        self._measure_from(graph, self.find_cell(goal, np.isfinite(self.far)))
+        self._measure_from(
+            graph, self.find_cell(goal, np.isfinite(self.seconds_to_goal))
+        )
         return False
 
     def _measure_from(self, graph: Any, cell: tuple[int, ...]) -> None:
         far, self._next = dijkstra(
             graph, directed=False, indices=self._numbers[cell], return_predecessors=True
         )
-        self.far, self.end = np.full(self.shape, inf), cell
-        self.far[self.free] = far
+        self.seconds_to_goal, self.end = np.full(self.shape, inf), cell
+        self.seconds_to_goal[self.free] = far
 
     def descend(self, cell: tuple[int, ...]) -> Array:
         """Centres of the cells from `cell` to the end, shape (n, 2) [m]."""
@@ -310,7 +314,7 @@ def find_route(
     segments, c = read_walls(walls), max(c, _LEAST)
     length = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
     group = Group(Wall, segments.reshape(-1, 4), c + c**2 / length)
-    found = Map(Obstacles((group,), c), np.array([at, end]), _find_side(c))
+    found = Map(Obstacles((group,), c), np.array([at, end]), _choose_cell(c))
     if not found.measure(at, end, 1.0, np.zeros(found.shape)):
         return np.zeros((0, 2))
     points = np.vstack([at, found.descend(found.find_cell(at))[1:-1], end])
@@ -322,7 +326,7 @@ def find_route(
     return points[corners]
 
 
-def _find_side(clearance: float) -> float:
+def _choose_cell(clearance: float) -> float:
     """Side of a cell with which a map shows walls of this `clearance` [m]."""
     return min(CELL, max(_LEAST, clearance) / _MOST_SHARE)
 
@@ -339,7 +343,7 @@ class WayFinder:
     def __init__(self, fixed: Obstacles, settings: MPCSettings) -> None:
         self._fixed, self._s = fixed, settings
         self._map: Map | None = None
-        self._every = ceil(EVERY / settings.dt)
+        self._every = ceil(SEARCH_INTERVAL / settings.dt)
         self.reset()
 
     def reset(self) -> None:
@@ -357,10 +361,9 @@ class WayFinder:
             self._search(at, goal, zones)
             self._steps, self._n_people = self._every, zones.size
         self._steps -= 1
-        heading = self._head(at, goal, self._ways[0].points, self._blocked)
-        if not self._is_reached:
-            heading = heading._replace(length=inf)
-        return heading._replace(ways=tuple(self._ways), is_searched=is_searched)
+        heading = self._find_target(at, goal, self._ways[0].points, self._blocked)
+        length, ways = heading.length if self._is_reached else inf, tuple(self._ways)
+        return heading._replace(length=length, ways=ways, is_searched=is_searched)
 
     def follow(self, at: Point, goal: Point, route: Array) -> Heading | None:
         """The target from `at` on a `route` to the `goal`, shape (m, 2) [m]; None if no point is in sight."""
@@ -375,12 +378,12 @@ class WayFinder:
         near = points[begin:][: 1 + int(min(self._s.lookahead, _FARTHEST) / m.cell)]
         if not m.sees(np.array(at), near, ~m.free).any():
             return None
-        return self._head(at, goal, points, ~m.free)
+        return self._find_target(at, goal, points, ~m.free)
 
     def _get_map(self, at: Point, goal: Point) -> Map:
         """The map that holds these points."""
         if self._map is None or not self._map.holds(at, goal):
-            side = _find_side(self._s.r_robot + self._s.eps)
+            side = _choose_cell(self._s.r_robot + self._s.eps)
             self._map, self._known = Map(self._fixed, np.array([at, goal]), side), ()
             self._steps = 0
         return self._map
@@ -394,19 +397,19 @@ class WayFinder:
         stands = is_near & (np.hypot(*stamps.rows[:, :2].T) < STANDING_SPEED)
         near, places = is_near[: len(people)], stamps.rows[stands, 2:]
         known = (self._goal, *np.round(places / _MOVED).ravel().tolist())
-        if known != self._known or not np.isfinite(m.far[m.find_cell(at)]):
+        if known != self._known or not np.isfinite(m.seconds_to_goal[m.find_cell(at)]):
             price = np.zeros((1, *m.shape))
             stamps.add(price, np.flatnonzero(stands), np.zeros(1), m.corner)
             self._is_reached = m.measure(at, goal, self._s.v_max, price[0])
-            self._known, self._blocked = known, ~m.free | (price[0] >= IN_BODY)
+            self._known, self._blocked = known, ~m.free | (price[0] >= BODY_SECOND)
         walks = np.flatnonzero(is_near & ~stands)
-        last = [_cut(way, at) for way in self._ways[:1]]
         around = self._list_around(m, at, people[near])
         found = self._find_ways(m, at, goal, people[near], around, stamps, walks)
         ways = sorted(found, key=lambda way: way.cost)
-        for old in last:
-            kept = [way for way in ways if not _differ(way, old, around)]
-            if kept and kept[0].cost < ways[0].cost + KEEP:
+        if self._ways:
+            before = _cut(self._ways[0], at)
+            kept = [way for way in ways if not _differ(way, before, around)]
+            if kept and kept[0].cost < ways[0].cost + SWITCH_GAIN:
                 ways = [kept[0], *(way for way in ways if way is not kept[0])]
         numbers = np.flatnonzero(near).tolist()
         names = [_name(m, way, people[near], numbers) for way in ways]
@@ -427,14 +430,14 @@ class WayFinder:
     ) -> list[Way]:
         """Distinct ways on the map `m` among `people`; those in the rows `walks` of `stamps` walk."""
         v_max = self._s.v_max
-        start = np.array(m.find_cell(at, np.isfinite(m.far)))
-        size = ceil(WINDOW / m.cell)
+        start = np.array(m.find_cell(at, np.isfinite(m.seconds_to_goal)))
+        size = ceil(SEARCH_RADIUS / m.cell)
         low, high = np.maximum(start - size, 0), np.minimum(start + size + 1, m.shape)
         window = tuple(slice(*ends) for ends in zip(low, high, strict=True))
-        far, begin = m.far[window], tuple((start - low).tolist())
+        far, begin = m.seconds_to_goal[window], tuple((start - low).tolist())
         ends = np.array(goal)[None] if self._is_reached else np.zeros((0, 2))
         dt = 1.2 * m.cell / v_max  # between a step along an axis and a diagonal one
-        times: Array = dt * np.arange(1.0, ceil(AHEAD / dt) + 1)
+        times: Array = dt * np.arange(1.0, ceil(SEARCH_TIME / dt) + 1)
         prices = np.zeros((len(times), *far.shape))
         stamps.add(prices, walks, times, m.corner + low * m.cell)
         if not prices.any() and not m.price[window].any():
@@ -448,7 +451,10 @@ class WayFinder:
         if (end >= 0).all() and (end < far.shape).all():
             costs[:, end[0], end[1]] = 0.0  # a robot at its goal may stay there
         ways, again = list[Way](), np.zeros(far.shape, np.float32)
-        layers, tube = np.arange(len(times)), np.ones(2 * [2 * int(_TUBE / m.cell) + 1])
+        layers, tube = (
+            np.arange(len(times)),
+            np.ones(2 * [2 * int(_NEAR_WAY / m.cell) + 1]),
+        )
         while len(ways) < MOST_WAYS:
             cells = _cross_layers(costs + again, begin, far)
             then = tuple(cells[-1].tolist())
@@ -466,14 +472,14 @@ class WayFinder:
                 break
             ways.append(way)
             used = np.zeros(far.shape, bool)
-            used[tuple(cells.T)] = np.hypot(*(cells - begin).T) * m.cell > 2 * _TUBE
-            again += np.float32(dt * AGAIN) * binary_dilation(used, tube)
+            used[tuple(cells.T)] = np.hypot(*(cells - begin).T) * m.cell > 2 * _NEAR_WAY
+            again += np.float32(dt * REPEAT_SECOND) * binary_dilation(used, tube)
         return ways
 
     @staticmethod
     def _list_around(m: Map, at: Point, people: Array) -> Array:
         """Velocity and position of `people`, and of places that are not free, shape (n, 4) [m/s, m]."""
-        size = ceil(WINDOW / m.cell)
+        size = ceil(SEARCH_RADIUS / m.cell)
         i, j = (each - size for each in m.find_cell(at))
         around = m.free[max(i, 0) : i + 2 * size, max(j, 0) : j + 2 * size]
         fixed = np.argwhere(~around)
@@ -489,9 +495,11 @@ class WayFinder:
         meets = (across <= share) & (ahead[0] * vx + ahead[1] * vy <= 0)
         sign = 1 if self._s.pass_side == "right" else -1
         turns = sign * _find_turns(way, people[:, 5:])
-        return OTHER_SIDE * bool((meets & (turns < -pi / 2)).any())
+        return SIDE_PRICE * bool((meets & (turns < -pi / 2)).any())
 
-    def _head(self, at: Point, goal: Point, points: Array, blocked: Mask) -> Heading:
+    def _find_target(
+        self, at: Point, goal: Point, points: Array, blocked: Mask
+    ) -> Heading:
         """The target on the way through these `points`: the farthest one in sight, at most `lookahead` away.
 
         Behind it the target goes on straight ahead while this is free, so that the robot does not stop there.
@@ -521,7 +529,7 @@ class WayFinder:
 
 def _find_turns(way: Way, around: Array) -> Array:
     """Angles by which a `way` turns around what moves and stands `around` it, shape (n,) [rad]."""
-    times = np.linspace(0.0, 2 * AHEAD, 80)
+    times = np.linspace(0.0, 2 * SEARCH_TIME, 80)
     offset = way.at(times) - around[:, None, 2:] - times[:, None] * around[:, None, :2]
     turns = np.diff(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)
     return np.asarray(((turns + pi) % (2 * pi) - pi).sum(axis=1))
@@ -556,21 +564,24 @@ class _Stamps:
         foci = np.abs(own.numbers[:, :4] - np.tile(people[:, 2:], 2)).max()
         reach = foci + float((own.numbers[:, 4] + own.offsets).max())
         reach = max(reach, BODY_RADIUS + float(bodies.offsets.max()))
-        reach = ceil(min(reach, 2 * WINDOW) / cell)
+        reach = ceil(min(reach, 2 * SEARCH_RADIUS) / cell)
         steps = np.arange(-reach, reach + 1)
         cells = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1)
         x, y = np.moveaxis(people[:, None, None, 2:] + cell * cells, -1, 0)
         prices = np.zeros(x.shape)
-        for (kind, numbers, offsets), price in ((own, IN_ZONE), (bodies, IN_BODY)):
+        for (kind, numbers, offsets), price in (
+            (own, ZONE_SECOND),
+            (bodies, BODY_SECOND),
+        ):
             d = kind.distance(x, y, 0.0, *numbers.T[..., None, None])
             prices[d < offsets[:, None, None]] = price
         i, j = np.triu_indices(len(people), 1)
         apart = np.hypot(*(people[i] - people[j])[:, 2:].T)
         differ = np.hypot(*(people[i] - people[j])[:, :2].T)
-        together = (apart < TOGETHER) & (differ < ALIKE)
+        together = (apart < GROUP_DISTANCE) & (differ < GROUP_SPEED)
         i, j, apart = i[together], j[together], apart[together]
         between = np.hypot(*cells.T) * cell < apart[:, None, None] / 2
-        self._prices = np.concatenate([prices, IN_GROUP * between])
+        self._prices = np.concatenate([prices, GROUP_SECOND * between])
         self.rows = np.concatenate([people, (people[i] + people[j]) / 2])
 
     def add(self, prices: Array, rows: Cells, times: Array, corner: Array) -> None:
@@ -597,7 +608,7 @@ def _cross_layers(costs: Any, begin: tuple[int, ...], far: Array) -> Array:
     """
     layers = np.full((len(costs) + 1, *(n + 2 for n in far.shape)), inf, np.float32)
     layers[0, begin[0] + 1, begin[1] + 1] = 0.0
-    step = np.float32(_STEP)
+    step = np.float32(_MOVE_PRICE)
     for now, then, cost in zip(layers, layers[1:], costs, strict=False):
         across = np.minimum(np.minimum(now[:-2], now[2:]) + step, now[1:-1])
         both = np.minimum(across[:, :-2], across[:, 2:]) + step
@@ -608,7 +619,7 @@ def _cross_layers(costs: Any, begin: tuple[int, ...], far: Array) -> Array:
     cells = [(i, j)]
     for layer in layers[:k][::-1]:
         i, j = cells[-1]
-        a, b = divmod(int((layer[i : i + 3, j : j + 3] + step * _STEPS).argmin()), 3)
+        a, b = divmod(int((layer[i : i + 3, j : j + 3] + step * _MOVES).argmin()), 3)
         cells.append((i + a - 1, j + b - 1))
     return np.array(cells[::-1])
 
@@ -630,7 +641,7 @@ def _cut(way: Way, at: Point) -> Way:
 def _find_door(m: Map, way: Way) -> list[tuple[float, str]]:
     """When a way leads through the first door, and where: it is narrow, with more room before and behind."""
     lengths = _time(way.points, 1.0)
-    along = np.arange(0.0, min(float(lengths[-1]), 2 * WINDOW), m.cell)
+    along = np.arange(0.0, min(float(lengths[-1]), 2 * SEARCH_RADIUS), m.cell)
     places = np.column_stack([np.interp(along, lengths, each) for each in way.points.T])
     if len(places) < 3:
         return []
@@ -657,12 +668,12 @@ def _find_door(m: Map, way: Way) -> list[tuple[float, str]]:
 
 def _name(m: Map, way: Way, people: Array, numbers: Sequence[int]) -> str:
     """A way in words: a door, the side of people whom it passes, and for whom it waits."""
-    times, found = np.linspace(0.0, 2 * AHEAD, 121), _find_door(m, way)
+    times, found = np.linspace(0.0, 2 * SEARCH_TIME, 121), _find_door(m, way)
     points = way.at(times)
     for number, row in zip(numbers, people, strict=True):
         offset = points - row[7:] - times[:, None] * row[5:7]
         k = int(np.hypot(*offset.T).argmin())
-        if not 0 < k < len(times) - 1 or np.hypot(*offset[k]) > _BESIDE:
+        if not 0 < k < len(times) - 1 or np.hypot(*offset[k]) > _NAMED_WITHIN:
             continue
         dx, dy = points[min(k + 5, 120)] - points[max(k - 5, 0)]
         (x, y), (vx, vy) = offset[k], row[5:7]
@@ -678,7 +689,7 @@ def _name(m: Map, way: Way, people: Array, numbers: Sequence[int]) -> str:
     away = np.hypot(*(way.points - way.points[-1]).T) > 2 * m.cell
     arrival = way.times[np.flatnonzero(away)].max(initial=0.0)
     rests = (moved < 0.2 * moved.max(initial=0.0)) & (times[1:] < arrival)
-    if rests.sum() >= _WAITS and len(people):
+    if rests.sum() >= _WAITING and len(people):
         last = points[np.flatnonzero(rests)[-1]]
         gaps = np.hypot(*(people[:, 7:] - last).T)
         words.insert(0, f"waits for person {numbers[int(gaps.argmin())]}")

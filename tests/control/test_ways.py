@@ -16,12 +16,12 @@ import szlib
 from szlib.checks import Array
 from szlib.control import HalfPlane, Obstacles, Wall, Zone, find_route
 from szlib.control.ways import (
-    ALIKE,
     CELL,
-    IN_GROUP,
-    IN_ZONE,
-    KEEP,
-    TOGETHER,
+    GROUP_DISTANCE,
+    GROUP_SECOND,
+    GROUP_SPEED,
+    SWITCH_GAIN,
+    ZONE_SECOND,
     Map,
     Way,
     WayFinder,
@@ -162,7 +162,7 @@ def test_times_to_the_goal_are_those_of_straight_ways_on_free_floor() -> None:
     assert found.measure((0.0, 0.0), (6.0, 2.0), 2.0, np.zeros(found.shape))
     centers = found.centers(np.argwhere(found.free))
     straight = np.hypot(*(centers - found.centers(np.array(found.end))).T) / 2.0
-    far = found.far.ravel()
+    far = found.seconds_to_goal.ravel()
     assert (far >= straight - 1e-9).all() and (far <= 1.03 * straight + 1e-9).all()
 
 
@@ -474,14 +474,14 @@ def test_a_way_is_kept_until_another_is_clearly_cheaper() -> None:
             found = finder.find((-3.0, 0.0), (3.0, 0.0), zones)
         way = found.ways[0]
         sides.append(np.sign(np.interp(0.0, *way.points.T) - y))
-        assert way.cost < min(each.cost for each in found.ways) + KEEP
+        assert way.cost < min(each.cost for each in found.ways) + SWITCH_GAIN
     assert sides[0] > 0 > sides[-1]
     changes = np.flatnonzero(np.diff(sides))
     assert len(changes) == 1 and np.linspace(-0.8, 0.8, 41)[changes[0]] > 0.05
 
 
 def test_a_zone_is_crossed_only_where_the_way_around_costs_more() -> None:
-    """A corridor with a person: through the zone costs `IN_ZONE` a second."""
+    """A corridor with a person: through the zone costs `ZONE_SECOND` a second."""
     walls = [[(-9, -1.4), (9, -1.4)], [(-9, 1.4), (9, 1.4)]]
     for walls_here, crosses in (((), False), (walls, True)):
         controller = szlib.MPCCBF(ROUND, walls=walls_here, settings=AMONG)
@@ -490,7 +490,8 @@ def test_a_zone_is_crossed_only_where_the_way_around_costs_more() -> None:
         inside = np.hypot(*points.T) < 0.8 + 0.3
         assert inside.any() == crosses
         assert step.ways[0].cost == pytest.approx(
-            step.ways[0].times[-1] + IN_ZONE * 0.15 * inside.sum() * crosses, rel=0.2
+            step.ways[0].times[-1] + ZONE_SECOND * 0.15 * inside.sum() * crosses,
+            rel=0.2,
         )
 
 
@@ -508,8 +509,8 @@ def test_between_two_people_who_are_together_a_way_has_its_price(apart, rates) -
     stamps.add(
         price, np.arange(len(stamps.rows)), np.array([2.0]), np.array([-3.0, -3])
     )
-    places = -3.0 + 0.1 * (np.argwhere(price[0] == IN_GROUP) + 0.5)
-    is_group = apart < TOGETHER and abs(rates[0] - rates[1]) < ALIKE
+    places = -3.0 + 0.1 * (np.argwhere(price[0] == GROUP_SECOND) + 0.5)
+    is_group = apart < GROUP_DISTANCE and abs(rates[0] - rates[1]) < GROUP_SPEED
     assert len(stamps.rows) == 2 + is_group and (len(places) > 0) == is_group
     if is_group:
         middle = 2.0 * sum(rates) / 2

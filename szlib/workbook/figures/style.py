@@ -93,8 +93,9 @@ def add_shared_legend(panels: Sequence[Axes]) -> None:
     >>> figures.add_shared_legend(panels)
     """
     handles, names = panels[0].get_legend_handles_labels()
+    known = dict(zip(names, handles, strict=True))
     panels[0].figure.legend(
-        handles, names, loc="outside lower center", ncols=len(names)
+        known.values(), known, loc="outside lower center", ncols=len(known)
     )
 
 
