@@ -89,7 +89,9 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
         raise SolverError(f"{name} must have shape {shape}; got {value!r}") from error
     if array.dtype.kind not in "iuf":
         raise SolverError(f"{name} must be numbers of shape {shape}; got {value!r}")
-    fits = array.shape[-1:] == shape[1:] if ... in shape else array.shape == shape
+    fits = array.shape == shape
+    if ... in shape:
+        fits = array.shape[max(0, array.ndim - len(shape) + 1) :] == shape[1:]
     if not fits:
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)

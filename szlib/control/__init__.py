@@ -31,7 +31,7 @@ from .obstacles import (
     ellipse_distance,
     segment_distance,
 )
-from .people import Person, TrackedPeople, Tracker
+from .people import Person, Prediction, TrackedPeople, Tracker, predict
 from .settings import MPCSettings
 from .step import (
     STATUSES,

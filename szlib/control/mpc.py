@@ -56,8 +56,16 @@ from ..checks import (
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .controller import Controller, StepClock, find_stopping_path
-from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone
-from .people import People, Person, SpeedZone, TrackedPeople, Tracker, as_ellipse
+from .obstacles import Group, Obstacle, Obstacles, Path, PredictedZone, Wall, Zone
+from .people import (
+    People,
+    Person,
+    SpeedZone,
+    TrackedPeople,
+    Tracker,
+    as_ellipse,
+    list_knots,
+)
 from .planner import Plan, Planner
 from .problem import (
     Question,
@@ -146,7 +154,10 @@ class MPCCBF(Controller):
     ) -> None:
         self.settings = settings or MPCSettings()
         speed = self.settings.zone_speed
-        if hasattr(zone, "verdict") and (verdict := zone.verdict(speed)) != "usable":
+        verdict: Any = getattr(zone, "verdict", "usable")
+        if callable(verdict):
+            verdict = verdict(speed)
+        if verdict != "usable":
             warn(
                 f"the zone at {speed:g} m/s should not be relied on: {verdict.sentence}"
             )
@@ -459,8 +470,12 @@ class MPCCBF(Controller):
                 is_usual = person.zone is None and heading is not None
                 found.append(zone := self.zone if is_usual else self.zone_of(person))
                 placed.append(Zone.place(zone, at, heading or 0.0, velocity))
-            offsets = np.full(len(placed), s.r_robot + s.eps)
-            zones = Obstacles((Group(Zone, np.array(placed), offsets),), s.r_robot)
+            numbers = np.array(placed)
+            offsets, kind = np.full(len(placed), s.r_robot + s.eps), Zone
+            if any(person.prediction for person in tracked.people):
+                knots = [list_knots(person, s) for person in tracked.people]
+                numbers, kind = np.hstack([numbers, knots]), PredictedZone
+            zones = Obstacles((Group(kind, numbers, offsets),), s.r_robot)
         near_fixed = self._fixed if near is None else self._near_fixed
         return Scene(
             tuple(state),
@@ -487,7 +502,8 @@ class MPCCBF(Controller):
             require(is_line, "route", corners.shape, expected, SolverError)
             found = self._ways.follow(at, goal, corners)
         if not found and (route is not None or s.lookahead < inf):
-            found = self._ways.find(at, goal, scene.zones)
+            groups = [person.group for person in scene.people]
+            found = self._ways.find(at, goal, scene.zones, groups)
         heading = found or Heading(goal, dist(at, goal))
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max

@@ -32,6 +32,8 @@ from .settings import MPCSettings
 
 # Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre.
 SHORTEST_WALL = 1e-3
+# Numbers of a `Zone`, and of each interval of a prediction
+ZONE_SIZE, KNOT = 9, 4
 
 
 def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
@@ -366,6 +368,61 @@ class Body(Obstacle):
         return np.hypot(numbers[:, 2], numbers[:, 3])
 
 
+def _drift(t: Any, knots: Any) -> list[Any]:
+    """Integrals of rates from 0 to `t`; `knots`: for each interval its end, and its rates."""
+    found, begin = [0.0] * (KNOT - 1), 0.0
+    for i in range(0, len(knots), KNOT):
+        end, *rates = knots[i : i + KNOT]
+        # time within the interval
+        inside = (abs(t - begin) - abs(t - end) + end - begin) / 2
+        found = [sum_ + rate * inside for sum_, rate in zip(found, rates, strict=True)]
+        begin = end
+    return found
+
+
+class PredictedZone(Zone):
+    """The zone of a person with a `Prediction`.
+
+    Parameters
+    ----------
+    numbers : those of `Zone`, and for each interval of the horizon its end, the rates at which the person
+        leaves the motion at constant velocity, and at which the zone grows [s, m/s, m/s, m/s].
+    """
+
+    kind = "predicted person"
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """See `Zone.distance`; parameters as of `Obstacle.distance`."""
+        dx, dy, growth = _drift(t, numbers[ZONE_SIZE:])
+        return Zone.distance(x - dx, y - dy, t, *numbers[:ZONE_SIZE]) - growth
+
+    @classmethod
+    def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """Distance to the person's body; parameters as of `Obstacle.distance`."""
+        dx, dy, _ = _drift(t, numbers[ZONE_SIZE:])
+        return Zone.gap(x - dx, y - dy, t, *numbers[:ZONE_SIZE])
+
+    @classmethod
+    def speeds(cls, numbers: Array) -> Array:
+        """See `Obstacle.speeds`; `numbers` as there."""
+        rates = numbers[:, ZONE_SIZE:].reshape(len(numbers), -1, KNOT)[..., 1:]
+        fastest = np.abs(rates).sum(axis=2).max(axis=1, initial=0.0)
+        return np.asarray(Zone.speeds(numbers) + fastest)
+
+
+class PredictedBody(Body):
+    """The body of a person with a `Prediction`; its `numbers` end as those of a `PredictedZone`."""
+
+    kind = "predicted body"
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """See `Body.distance`; parameters as of `Obstacle.distance`."""
+        dx, dy, _ = _drift(t, numbers[4:])
+        return Body.distance(x - dx, y - dy, t, *numbers[:4])
+
+
 class Wall(Obstacle):
     """A wall: a segment, whose `numbers` are its ends (xa, ya, xb, yb) [m] (paper, eq. 3-5)."""
 
@@ -652,13 +709,28 @@ class Obstacles(NamedTuple):
         return found
 
 
-def find_bodies(zones: Obstacles, settings: MPCSettings) -> Obstacles:
-    """The bodies of the people who have these `zones`, for a robot with these `settings`."""
+def find_bodies(
+    zones: Obstacles, settings: MPCSettings, *, as_predicted: bool = False
+) -> Obstacles:
+    """The bodies of the people who have these `zones`, for a robot with these `settings`.
+
+    At constant velocity, or `as_predicted`.
+    """
     if not zones.groups:
         return zones
-    numbers = zones.groups[0].numbers[:, [7, 8, 5, 6]]
+    kind, numbers, _ = zones.groups[0]
+    bodies, own = Body, numbers[:, [7, 8, 5, 6]]
+    if as_predicted and kind is PredictedZone:
+        bodies, own = PredictedBody, np.hstack([own, numbers[:, ZONE_SIZE:]])
     offsets = np.full(len(numbers), settings.r_robot + settings.body_gap)
-    return Obstacles((Group(Body, numbers, offsets),), settings.r_robot)
+    return Obstacles((Group(bodies, own, offsets),), settings.r_robot)
+
+
+def find_places(zones: Group, times: Array) -> Array:
+    """Where the people who have these `zones` are at these `times` from now, shape (n, k, 2) [m]."""
+    steady = zones.numbers[:, None, 7:9] + times[:, None] * zones.numbers[:, None, 5:7]
+    dx, dy, _ = _drift(times, zones.numbers.T[ZONE_SIZE:, :, None])
+    return np.asarray(steady + np.stack(np.broadcast_arrays(dx, dy), axis=-1))
 
 
 def rebuild(kind: type[Obstacle], numbers: Sequence[float]) -> Obstacle:

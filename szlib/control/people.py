@@ -24,24 +24,26 @@ from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from math import atan2, dist, hypot, inf, isfinite
-from typing import NamedTuple, Protocol, TypeGuard, cast
+from typing import Any, NamedTuple, Protocol, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import LARGEST, Array, check_number, check_point
+from ..checks import LARGEST, Array, check_array, check_number, check_point, require
 from ..errors import SolverError, ZoneError
 from ..zones.ellipses import Ellipse
+from .settings import MPCSettings
 
 # Below this speed a person counts as standing, to allow for a tracker's noise [m/s] (assumed).
 STANDING_SPEED = 0.1
 
 
 class SpeedZone(Protocol):
-    """Anything that has a zone for each walking speed, such as `SocialZone`."""
+    """Anything that has a zone, such as `SocialZone` or `ReferenceZone`."""
 
-    def ellipse(self, speed: float) -> Ellipse:
-        """The zone at a walking `speed` [m/s], in the person's frame."""
+    @property
+    def ellipse(self) -> Any:
+        """The zone in the person's frame, or a function that gives it for a walking speed [m/s]."""
 
 
 def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
@@ -51,11 +53,14 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
     smaller than a body, as a measured zone may be: `Step.safe` keeps the robot off bodies besides.
     """
     if not isinstance(zone, Ellipse):
-        if not hasattr(zone, "ellipse"):
+        found = getattr(zone, "ellipse", None)
+        if callable(found):
+            found = found(speed)
+        if not isinstance(found, Ellipse):
             raise ZoneError(
                 f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}"
             )
-        zone = zone.ellipse(speed)
+        zone = found
     (m, n), (a, _) = zone.center, zone.semi_axes
     if not max(abs(m), abs(n), a) <= LARGEST:
         raise ZoneError(
@@ -67,6 +72,135 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
             f"a zone must contain its person, who is at (0, 0) of its frame; got {zone}"
         )
     return zone
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Where a person will be, by a predictor; after its last time they keep their velocity.
+
+    The zone of the person grows by `SPREAD` standard deviations: along one direction, a normally distributed
+    position is farther off towards the robot with a probability of 5 %.
+
+    Parameters
+    ----------
+    times : from when the person was measured, positive and increasing, shape (T,) [s].
+    positions : shape (T, 2) [m].
+    spread : of the positions: standard deviation, a number or shape (T,) [m], or covariance matrices, shape
+        (T, 2, 2) [m2], of which the largest standard deviation counts. It begins at 0 now.
+
+    Raises
+    ------
+    SolverError : a number or a shape cannot be used.
+
+    Examples
+    --------
+    A person who is about to turn left, as a predictor says:
+
+    >>> import szlib
+    >>> from szlib.control import Prediction
+    >>> turns = Prediction(times=[1.0, 2.0], positions=[(1.0, 0.5), (1.5, 1.0)], spread=[0.1, 0.2])
+    >>> person = szlib.Person((0.0, 0.0), (1.0, 0.0), prediction=turns)
+    >>> person.after(1.5).position
+    (1.25, 0.75)
+    """
+
+    times: ArrayLike
+    positions: ArrayLike
+    spread: ArrayLike = 0.0
+
+    def __post_init__(self) -> None:
+        times = check_array("the times of a prediction", self.times, (...,))
+        n = len(times) if times.ndim == 1 else 0
+        is_later = n > 0 and times[0] > 0 and bool((np.diff(times) > 0).all())
+        expected = "positive and increasing, shape (T,)"
+        require(
+            is_later, "the times of a prediction", self.times, expected, SolverError
+        )
+        name = "the positions of a prediction"
+        positions = check_array(name, self.positions, (n, 2))
+        spread = check_array("the spread of a prediction", self.spread, (...,))
+        if spread.shape == (n, 2, 2):
+            variances = np.linalg.eigvalsh((spread + spread.swapaxes(1, 2)) / 2)
+            spread = np.sqrt(variances.max(axis=1).clip(0.0))
+        is_spread = spread.shape in ((), (n,)) and bool((spread >= 0).all())
+        expected = f"at least 0: a number, or of shape ({n},) or ({n}, 2, 2)"
+        require(is_spread, "the spread", self.spread, expected, SolverError)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "spread", np.broadcast_to(spread, n))
+
+    def sample(self, person: Person, times: Array) -> Array:
+        """Offset of a `person` from constant velocity, and growth of the zone, at these `times`, (n, 3) [m]."""
+        (x, y), (vx, vy) = person.position, person.velocity
+        own, xy = np.asarray(self.times), np.asarray(self.positions)
+        growth = SPREAD * np.asarray(self.spread)
+        steady = np.column_stack([x + own * vx, y + own * vy])
+        offsets = np.column_stack([xy - steady, growth])
+        knots = np.r_[0.0, own]
+        rows = [np.interp(times, knots, np.r_[0.0, each]) for each in offsets.T]
+        return np.column_stack(rows)
+
+    def later(self, seconds: float) -> Prediction | None:
+        """The same prediction for the person `seconds` later; None if nothing of it is left."""
+        times = np.asarray(self.times) - seconds
+        left = times > 0
+        if not left.any():
+            return None
+        xy, spread = np.asarray(self.positions), np.asarray(self.spread)
+        return Prediction(times[left], xy[left], spread[left])
+
+
+def list_knots(person: Person, settings: MPCSettings) -> Array:
+    """What a `PredictedZone` of a `person` needs for each interval of the horizon of these `settings`."""
+    times = np.array(settings.times)
+    if person.prediction is None:
+        return np.column_stack([times[1:], np.zeros((settings.N, 3))]).ravel()
+    offsets = person.prediction.sample(person, times)
+    rates = np.diff(offsets, axis=0) / np.diff(times)[:, None]
+    return np.column_stack([times[1:], rates]).ravel()
+
+
+SPREAD = 1.64
+"""Standard deviations of a predicted position by which the zone grows: 95 % on one side (assumed)."""
+
+
+def predict(
+    people: ArrayLike, times: ArrayLike, positions: ArrayLike, spread: ArrayLike = 0.0
+) -> list[Person]:
+    """`Person`s with the predictions of all of them.
+
+    Parameters
+    ----------
+    people : shape (n, 4): x, y [m], vx, vy [m/s].
+    times : one array for all, as of `Prediction`.
+    positions : shape (n, T, 2) [m].
+    spread : a number or shape (n, T) [m], or covariance matrices, shape (n, T, 2, 2) [m2].
+
+    Raises
+    ------
+    SolverError : a number or a shape cannot be used.
+
+    Examples
+    --------
+    >>> from szlib.control import predict
+    >>> one, = predict([[0.0, 0.0, 1.0, 0.0]], times=[1.0], positions=[[(1.0, 0.2)]], spread=0.1)
+    >>> one.after(1.0).position
+    (1.0, 0.2)
+    """
+    rows, xy = check_array("people", people, (..., 4)), np.asarray(positions)
+    spreads = np.asarray(spread)
+    require(rows.ndim == 2, "people", rows.shape, "of shape (n, 4)", SolverError)
+    for name, given in (("positions", xy), ("spread", spreads)):
+        is_each = given.shape[:1] == (len(rows),) or (
+            given is spreads and not given.ndim
+        )
+        expected = f"one for each of {len(rows)} people"
+        require(is_each, name, given.shape, expected, SolverError)
+    spreads = spreads if spreads.ndim else np.full(len(rows), spreads)
+    return [
+        Person((x, y), (vx, vy), prediction=Prediction(times, own, of))
+        for (x, y, vx, vy), own, of in zip(rows.tolist(), xy, spreads, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -82,6 +216,10 @@ class Person:
     zone : their social zone, in their own frame; None: the controller's.
     id : by which a `Tracker` recognises them; None: they are new at each step.
     heading_unknown : True if they are too slow for the velocity to give the heading.
+    prediction : where they will be; None: they keep their velocity. The problem and the ways use it. What a
+        step claims (`Step.safe`, `Step.passively_safe`) is about people who keep their velocity.
+    group : with whom they are together: a way between two of a group has a price. None: whoever is near and
+        has a like velocity (`szlib.control.ways`).
 
     Raises
     ------
@@ -107,6 +245,8 @@ class Person:
     zone: Ellipse | SpeedZone | None = None
     id: Hashable = None
     heading_unknown: bool = False
+    prediction: Prediction | None = None
+    group: Hashable = None
 
     def __post_init__(self) -> None:
         x, y = position = check_point("a person's position", self.position)
@@ -125,6 +265,10 @@ class Person:
             object.__setattr__(self, "heading", atan2(vy, vx))
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
+        if not isinstance(self.prediction, Prediction | None):
+            raise SolverError(
+                f"the prediction of a person must be a Prediction; got {self.prediction!r:.200}"
+            )
 
     @property
     def stands(self) -> bool:
@@ -132,11 +276,17 @@ class Person:
         return self.velocity == (0.0, 0.0)
 
     def after(self, seconds: float) -> Person:
-        """The same person, `seconds` later."""
-        if self.stands:
+        """The same person, `seconds` later, as predicted."""
+        if self.stands and self.prediction is None:
             return self
         (x, y), (vx, vy) = self.position, self.velocity
-        return self.at((x + vx * seconds, y + vy * seconds))
+        x, y = x + vx * seconds, y + vy * seconds
+        if self.prediction is None:
+            return self.at((x, y))
+        (dx, dy, _), *_ = self.prediction.sample(self, np.array([seconds])).tolist()
+        moved = self.at((x + dx, y + dy))
+        object.__setattr__(moved, "prediction", self.prediction.later(seconds))
+        return moved
 
     def at(self, position: tuple[float, float]) -> Person:
         """The same person at another `position` [m]; only the position is checked, for speed."""
@@ -319,9 +469,10 @@ class Tracker:
         )
         if not _are_usable(x, y):
             return last, False
-        heading, zone = (
-            (row.heading, row.zone) if isinstance(row, Person) else (None, None)
-        )
+        heading = zone = prediction = group = None
+        if isinstance(row, Person):
+            heading, zone = row.heading, row.zone
+            prediction, group = row.prediction, row.group
         if not abs(now - time) <= self.memory:
             return last or (Person((x, y), zone=zone, id=name), now), False
         if last is not None and time < last[1]:
@@ -339,7 +490,16 @@ class Tracker:
         elif not is_given:
             heading = None if last is None else last[0].heading
         return (
-            Person((x, y), (vx, vy), heading, zone, name, heading is None),
+            Person(
+                (x, y),
+                (vx, vy),
+                heading,
+                zone,
+                name,
+                heading is None,
+                prediction,
+                group,
+            ),
             time,
         ), True
 
@@ -349,8 +509,9 @@ def _move_forward(person: Person, time: float, now: float) -> Person | None:
     if time == now:
         return person
     (x, y), (vx, vy) = person.position, person.velocity
-    position = (x + (now - time) * vx, y + (now - time) * vy)
-    return person.at(position) if _are_usable(*position) else None
+    if not _are_usable(x + (now - time) * vx, y + (now - time) * vy):
+        return None
+    return person.after(now - time)
 
 
 def _measure_deviation(

@@ -354,7 +354,7 @@ class Planner:
     def _prepare(self, question: Question, has_floors: bool) -> _Prepared:
         obstacles = question.barriers
         if has_floors:
-            bodies = find_bodies(question.zones, self.settings)
+            bodies = find_bodies(question.zones, self.settings, as_predicted=True)
             obstacles = obstacles.joined(bodies)
         groups = obstacles.groups
         key = has_floors, *((kind, *of.shape) for kind, of, _ in groups)

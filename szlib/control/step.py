@@ -237,7 +237,8 @@ class Step:
         worst, found = dict.fromkeys(Priority, 0.0), [(scene.barriers, self._h_of_plan)]
         if has_floors:
             x, y, *_ = self.predicted.T
-            found.append((scene.bodies, scene.bodies.h(x, y, np.array(s.times))))
+            bodies = find_bodies(scene.zones, s, as_predicted=True)
+            found.append((bodies, bodies.h(x, y, np.array(s.times))))
         for obstacles, h in found:
             kinds = (kind for kind, *_, offsets in obstacles.groups for _ in offsets)
             for kind, own in zip(kinds, h, strict=True):

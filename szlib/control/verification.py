@@ -354,7 +354,7 @@ def _check_promises(step: Any, scene: Any, carry: Carry | None = None) -> Iterat
         points, times = _sample(x[0], pieces, s)
         if carry:
             points, times = carry(points[:: _SAMPLES - 1], times[:: _SAMPLES - 1])
-        gaps = _measure_all(scene, points, times, is_barrier=False)
+        gaps = _measure_all(scene, points, times, is_barrier=False, as_predicted=False)
         of_fixed, of_bodies = gaps[is_fixed], gaps[~is_fixed]
         if not is_clear and step.walls_safe and (of_fixed < -TOLERANCE).any():
             yield "the step says that it can stop before every wall; it cannot"
@@ -447,8 +447,9 @@ def _list_rows(scene: Any, x: Array, h: Array, residual: Array) -> list[Row]:
             hard[names[i]] = each.kind, h[i, 1 : s.N_h + 1]
     if s.decay_price < np.inf:
         for i, person in enumerate(scene.people):
-            away = x[:, :2] - person.position - np.outer(s.times, person.velocity)
-            gap = np.hypot(*away.T)[1:] - BODY_RADIUS - s.r_robot - s.body_gap
+            places, _ = _find_places(person, np.array(s.times), s, True)
+            away = np.hypot(*(x[:, :2] - places).T)[1:]
+            gap = away - BODY_RADIUS - s.r_robot - s.body_gap
             hard[f"the body of {names[i]}"] = "body", gap
     rows = [
         Row(kind, f"the condition of {name} from k = {k} to {k + 1}", float(value))
@@ -465,18 +466,27 @@ def _list_rows(scene: Any, x: Array, h: Array, residual: Array) -> list[Row]:
     return rows
 
 
-def _measure_all(scene: Any, points: Array, times: Array, *, is_barrier: bool) -> Array:
-    """h, or Euclidean gaps of the disc, of each obstacle at points and times from now, shape (n, k) [m]."""
+def _measure_all(
+    scene: Any,
+    points: Array,
+    times: Array,
+    *,
+    is_barrier: bool,
+    as_predicted: bool = True,
+) -> Array:
+    """h, or Euclidean gaps of the disc, of each obstacle at points and times from now, shape (n, k) [m].
+
+    People keep their velocity, or move `as_predicted`.
+    """
     s, found = scene.settings, list[Array]()
     for i, each in enumerate(scene.barriers.items):
         if isinstance(each, Zone):
             person, zone = scene.people[i], scene.person_zones[i]
-            center = person.position + np.outer(times, person.velocity)
-            measured = (
-                _measure_zone(points - center, person.heading or 0.0, zone)
-                if is_barrier
-                else np.hypot(*(points - center).T) - BODY_RADIUS
-            )
+            center, growth = _find_places(person, times, s, as_predicted)
+            measured = np.hypot(*(points - center).T) - BODY_RADIUS
+            if is_barrier:
+                offset, heading = points - center, person.heading or 0.0
+                measured = _measure_zone(offset, heading, zone) - growth
         elif isinstance(each, Wall):
             measured = (_measure_wall if is_barrier else _measure_segment)(points, each)
         else:
@@ -490,6 +500,18 @@ def _measure_all(scene: Any, points: Array, times: Array, *, is_barrier: bool) -
         margin = each.margin(s) if is_barrier else 0.0
         found.append(measured - s.r_robot - margin)
     return np.reshape(found, (-1, len(points)))
+
+
+def _find_places(
+    person: Any, times: Array, s: Any, as_predicted: bool
+) -> tuple[Array, Array]:
+    """Where a `person` is at these `times`, shape (n, 2), and by how much the zone has grown, (n,) [m]."""
+    steady = person.position + np.outer(times, person.velocity)
+    if person.prediction is None or not as_predicted:
+        return steady, np.zeros(len(steady))
+    samples = person.prediction.sample(person, np.array(s.times)).T
+    dx, dy, growth = (np.interp(times, s.times, each) for each in samples)
+    return steady + np.column_stack([dx, dy]), growth
 
 
 def _measure_zone(offset: Array, heading: float, zone: Ellipse) -> Array:

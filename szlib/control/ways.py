@@ -15,7 +15,7 @@ The robot keeps its way until another one is `SWITCH_GAIN` cheaper, so that it d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from math import acos, atan2, ceil, cos, dist, hypot, inf, pi, sin, sqrt
 from typing import Any, NamedTuple
 
@@ -28,7 +28,15 @@ from scipy.sparse.csgraph import dijkstra
 from ..checks import Array, check_number, check_point, require
 from ..errors import SolverError
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import Group, Obstacles, Wall, Zone, barrier, find_bodies
+from .obstacles import (
+    Group,
+    Obstacles,
+    Wall,
+    Zone,
+    barrier,
+    find_bodies,
+    find_places,
+)
 from .people import STANDING_SPEED
 from .settings import MPCSettings
 from .walls import read_walls
@@ -52,6 +60,9 @@ GROUP_SECOND, GROUP_DISTANCE, GROUP_SPEED = 4.0, 1.5, 0.3
 """Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed)."""
 SWITCH_GAIN = 1.0
 """A way is kept until another one is this much cheaper [s] (assumed)."""
+_GROUP_REACH = (
+    3.0  # people of a group that is given are together up to this distance [m]
+)
 MOST_WAYS = 3
 """Number of ways that are looked for (assumed)."""
 _AROUND_WALLS, _AROUND_POINTS = 2.0, 8.0  # edge of a map [m]
@@ -74,6 +85,9 @@ _NAMED = 3  # largest number of parts of a name
 _WAITING = 8  # tenths of a second of rest that are called waiting
 # where free space is looked for, from a zone's centre to where the robot passes
 _ALONG = np.linspace(0, 1, 20)
+# times at which people are looked at [s], and the time between two of them
+_TIMES = np.linspace(0.0, 2 * SEARCH_TIME, 121)
+_TICK, _LAST = float(_TIMES[1]), 60  # of a search
 _MOVES = np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
 
 
@@ -351,14 +365,20 @@ class WayFinder:
         self._ways, self._goal, self._steps = list[Way](), (inf, inf), 0
         self._n_people, self._known = 0, tuple[Any, ...]()
 
-    def find(self, at: Point, goal: Point, zones: Obstacles) -> Heading:
-        """The way from `at` to the `goal` among people who have these `zones`."""
+    def find(
+        self,
+        at: Point,
+        goal: Point,
+        zones: Obstacles,
+        groups: Sequence[Hashable] = (),
+    ) -> Heading:
+        """The way from `at` to the `goal` among people with these `zones` and `groups`."""
         if dist(goal, self._goal) > _GOAL_MOVED:
             self._ways, self._goal, self._steps = [], goal, 0
-        self._get_map(at, goal)
+        m = self._get_map(at, goal)
         is_searched = not self._steps or zones.size != self._n_people
         if is_searched:
-            self._search(at, goal, zones)
+            self._search(at, goal, _Stamps(zones, groups, m.cell, self._s))
             self._steps, self._n_people = self._every, zones.size
         self._steps -= 1
         heading = self._find_target(at, goal, self._ways[0].points, self._blocked)
@@ -388,31 +408,31 @@ class WayFinder:
             self._steps = 0
         return self._map
 
-    def _search(self, at: Point, goal: Point, zones: Obstacles) -> None:
+    def _search(self, at: Point, goal: Point, stamps: _Stamps) -> None:
         """Find the ways anew, and choose one."""
         m = self._get_map(at, goal)
-        people = zones.groups[0].numbers if zones.groups else np.zeros((0, 9))
-        stamps = _Stamps(zones, m.cell, self._s)
-        is_near = np.hypot(*(stamps.rows[:, 2:] - at).T) < _PEOPLE
-        stands = is_near & (np.hypot(*stamps.rows[:, :2].T) < STANDING_SPEED)
-        near, places = is_near[: len(people)], stamps.rows[stands, 2:]
-        known = (self._goal, *np.round(places / _MOVED).ravel().tolist())
+        places = stamps.find_places(_TIMES)
+        is_near = np.hypot(*(places[:, 0] - at).T) < _PEOPLE
+        moved = np.hypot(*(places[:, _LAST] - places[:, 0]).T)
+        stands = is_near & (moved < STANDING_SPEED * SEARCH_TIME)
+        near = np.flatnonzero(is_near[: stamps.n_people])
+        people = places[near]
+        known = (self._goal, *np.round(places[stands, 0] / _MOVED).ravel().tolist())
         if known != self._known or not np.isfinite(m.seconds_to_goal[m.find_cell(at)]):
             price = np.zeros((1, *m.shape))
             stamps.add(price, np.flatnonzero(stands), np.zeros(1), m.corner)
             self._is_reached = m.measure(at, goal, self._s.v_max, price[0])
             self._known, self._blocked = known, ~m.free | (price[0] >= BODY_SECOND)
         walks = np.flatnonzero(is_near & ~stands)
-        around = self._list_around(m, at, people[near])
-        found = self._find_ways(m, at, goal, people[near], around, stamps, walks)
+        around = self._list_around(m, at, people)
+        found = self._find_ways(m, at, goal, people, around, stamps, walks)
         ways = sorted(found, key=lambda way: way.cost)
         if self._ways:
             before = _cut(self._ways[0], at)
             kept = [way for way in ways if not _differ(way, before, around)]
             if kept and kept[0].cost < ways[0].cost + SWITCH_GAIN:
                 ways = [kept[0], *(way for way in ways if way is not kept[0])]
-        numbers = np.flatnonzero(near).tolist()
-        names = [_name(m, way, people[near], numbers) for way in ways]
+        names = [_name(m, way, people, near.tolist()) for way in ways]
         if not self._is_reached:
             names = ["to the nearest point that it can reach"] * len(ways)
         pairs = zip(ways, names, strict=True)
@@ -478,23 +498,24 @@ class WayFinder:
 
     @staticmethod
     def _list_around(m: Map, at: Point, people: Array) -> Array:
-        """Velocity and position of `people`, and of places that are not free, shape (n, 4) [m/s, m]."""
+        """Places of `people`, and those that are not free, at `_TIMES`, shape (n, k, 2) [m]."""
         size = ceil(SEARCH_RADIUS / m.cell)
         i, j = (each - size for each in m.find_cell(at))
         around = m.free[max(i, 0) : i + 2 * size, max(j, 0) : j + 2 * size]
         fixed = np.argwhere(~around)
         fixed = fixed[:: 1 + len(fixed) // _PLACES] + np.maximum([i, j], 0)
-        still = np.column_stack([np.zeros((len(fixed), 2)), m.centers(fixed)])
-        return np.concatenate([people[:, 5:], still])
+        still = np.repeat(m.centers(fixed)[:, None], len(_TIMES), axis=1)
+        return np.concatenate([people, still])
 
     def _price_sides(self, way: Way, people: Array) -> float:
         """Price of a `way` that meets `people` head-on, and passes on the side that is not preferred [s]."""
-        ahead, (vx, vy) = way.points[-1] - way.points[0], people[:, 5:7].T
+        ahead = way.points[-1] - way.points[0]
+        vx, vy = (people[:, 1] - people[:, 0]).T / _TICK
         across = np.abs(ahead[0] * vy - ahead[1] * vx)
         share = self._s.head_on_share * np.hypot(vx, vy) * np.hypot(*ahead)
         meets = (across <= share) & (ahead[0] * vx + ahead[1] * vy <= 0)
         sign = 1 if self._s.pass_side == "right" else -1
-        turns = sign * _find_turns(way, people[:, 5:])
+        turns = sign * _find_turns(way, people)
         return SIDE_PRICE * bool((meets & (turns < -pi / 2)).any())
 
     def _find_target(
@@ -528,9 +549,8 @@ class WayFinder:
 
 
 def _find_turns(way: Way, around: Array) -> Array:
-    """Angles by which a `way` turns around what moves and stands `around` it, shape (n,) [rad]."""
-    times = np.linspace(0.0, 2 * SEARCH_TIME, 80)
-    offset = way.at(times) - around[:, None, 2:] - times[:, None] * around[:, None, :2]
+    """Angles by which a `way` turns around places `around` it at `_TIMES`, shape (n,) [rad]."""
+    offset = way.at(_TIMES) - around
     turns = np.diff(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)
     return np.asarray(((turns + pi) % (2 * pi) - pi).sum(axis=1))
 
@@ -547,20 +567,23 @@ class _Stamps:
     Parameters
     ----------
     zones : of all people.
+    groups : to which they belong, None for somebody of whom this is not known; empty: it is known of nobody.
     cell : side of a cell [m].
     s : settings of the robot.
-
-    Attributes
-    ----------
-    rows : velocity and position of each person, and of the middle of each pair, shape (n, 4) [m/s, m].
     """
 
-    def __init__(self, zones: Obstacles, cell: float, s: MPCSettings) -> None:
-        self._cell, self.rows = cell, np.zeros((0, 4))
+    def __init__(
+        self,
+        zones: Obstacles,
+        groups: Sequence[Hashable],
+        cell: float,
+        s: MPCSettings,
+    ) -> None:
+        self._cell, self._zones, self.n_people = cell, zones, zones.size
         if not zones.groups:
             return
         own, bodies = zones.groups[0], find_bodies(zones, s).groups[0]
-        people = own.numbers[:, 5:]
+        people = own.numbers[:, 5:9]
         foci = np.abs(own.numbers[:, :4] - np.tile(people[:, 2:], 2)).max()
         reach = foci + float((own.numbers[:, 4] + own.offsets).max())
         reach = max(reach, BODY_RADIUS + float(bodies.offsets.max()))
@@ -579,20 +602,33 @@ class _Stamps:
         apart = np.hypot(*(people[i] - people[j])[:, 2:].T)
         differ = np.hypot(*(people[i] - people[j])[:, :2].T)
         together = (apart < GROUP_DISTANCE) & (differ < GROUP_SPEED)
+        if any(group is not None for group in groups):
+            pairs = zip(i.tolist(), j.tolist(), strict=True)
+            is_same = [groups[a] == groups[b] for a, b in pairs]
+            is_known = np.array([group is not None for group in groups])
+            known = is_known[i] & is_known[j]
+            together[known] = (np.array(is_same) & (apart < _GROUP_REACH))[known]
         i, j, apart = i[together], j[together], apart[together]
         between = np.hypot(*cells.T) * cell < apart[:, None, None] / 2
         self._prices = np.concatenate([prices, GROUP_SECOND * between])
-        self.rows = np.concatenate([people, (people[i] + people[j]) / 2])
+        self._pairs = i, j
+
+    def find_places(self, times: Array) -> Array:
+        """Places of people, and of the middles of pairs, at these `times`, shape (n, k, 2) [m]."""
+        if not self._zones.groups:
+            return np.zeros((0, len(times), 2))
+        people, (i, j) = find_places(self._zones.groups[0], times), self._pairs
+        return np.concatenate([people, (people[i] + people[j]) / 2])
 
     def add(self, prices: Array, rows: Cells, times: Array, corner: Array) -> None:
         """Add the `prices` of the people in these `rows`, at each of these `times`, shape (times, nx, ny).
 
         The `corner` is that of the first cell [m]. Where people overlap, the higher price counts.
         """
+        cells = np.floor((self.find_places(times) - corner) / self._cell).astype(int)
         for row in rows:
-            stamp, (velocity, place) = self._prices[row], self.rows[row].reshape(2, 2)
-            cells = np.floor((place + times[:, None] * velocity - corner) / self._cell)
-            first = cells.astype(int) - len(stamp) // 2
+            stamp = self._prices[row]
+            first = cells[row] - len(stamp) // 2
             for layer, (i, j) in zip(prices, first.tolist(), strict=True):
                 part = layer[max(i, 0) : max(i + len(stamp), 0)]
                 part = part[:, max(j, 0) : max(j + len(stamp), 0)]
@@ -668,15 +704,15 @@ def _find_door(m: Map, way: Way) -> list[tuple[float, str]]:
 
 def _name(m: Map, way: Way, people: Array, numbers: Sequence[int]) -> str:
     """A way in words: a door, the side of people whom it passes, and for whom it waits."""
-    times, found = np.linspace(0.0, 2 * SEARCH_TIME, 121), _find_door(m, way)
+    times, found = _TIMES, _find_door(m, way)
     points = way.at(times)
-    for number, row in zip(numbers, people, strict=True):
-        offset = points - row[7:] - times[:, None] * row[5:7]
+    for number, places in zip(numbers, people, strict=True):
+        offset = points - places
         k = int(np.hypot(*offset.T).argmin())
         if not 0 < k < len(times) - 1 or np.hypot(*offset[k]) > _NAMED_WITHIN:
             continue
         dx, dy = points[min(k + 5, 120)] - points[max(k - 5, 0)]
-        (x, y), (vx, vy) = offset[k], row[5:7]
+        (x, y), (vx, vy) = offset[k], (places[k + 1] - places[k]) / _TICK
         if abs(dx * vy - dy * vx) > 0.5 * hypot(dx, dy) * max(
             hypot(vx, vy), STANDING_SPEED
         ):
@@ -691,7 +727,7 @@ def _name(m: Map, way: Way, people: Array, numbers: Sequence[int]) -> str:
     rests = (moved < 0.2 * moved.max(initial=0.0)) & (times[1:] < arrival)
     if rests.sum() >= _WAITING and len(people):
         last = points[np.flatnonzero(rests)[-1]]
-        gaps = np.hypot(*(people[:, 7:] - last).T)
+        gaps = np.hypot(*(people[:, 0] - last).T)
         words.insert(0, f"waits for person {numbers[int(gaps.argmin())]}")
     straight = float(np.hypot(*(way.points[-1] - way.points[0])))
     is_straight = _time(way.points, 1.0)[-1] < 1.05 * straight + m.cell

@@ -505,13 +505,19 @@ def test_between_two_people_who_are_together_a_way_has_its_price(apart, rates) -
     zones = Obstacles.of(
         [Zone(*Zone.place(ROUND, p.position, 0.0, p.velocity)) for p in people], AMONG
     )
-    stamps, price = _Stamps(zones, 0.1, AMONG), np.zeros((1, 60, 60))
+    stamps, price = _Stamps(zones, (), 0.1, AMONG), np.zeros((1, 60, 60))
     stamps.add(
-        price, np.arange(len(stamps.rows)), np.array([2.0]), np.array([-3.0, -3])
+        price,
+        np.arange(len(stamps.find_places(np.zeros(1)))),
+        np.array([2.0]),
+        np.array([-3.0, -3]),
     )
     places = -3.0 + 0.1 * (np.argwhere(price[0] == GROUP_SECOND) + 0.5)
     is_group = apart < GROUP_DISTANCE and abs(rates[0] - rates[1]) < GROUP_SPEED
-    assert len(stamps.rows) == 2 + is_group and (len(places) > 0) == is_group
+    assert (
+        len(stamps.find_places(np.zeros(1))) == 2 + is_group
+        and (len(places) > 0) == is_group
+    )
     if is_group:
         middle = 2.0 * sum(rates) / 2
         assert np.hypot(*(places - (middle, 0.0)).T).max() < apart / 2 + 0.15
@@ -680,3 +686,21 @@ def test_a_wall_that_just_reaches_into_the_space_makes_the_side_not_free(end, sh
         settings,
     )
     assert (target[1] > shift) == (end == -1.89)
+
+
+def test_a_group_that_is_given_is_passed_around_though_its_members_are_far_apart() -> (
+    None
+):
+    """Two who stand 2.8 m apart: between them if they are strangers, around them if they are together."""
+    zone, sides = szlib.Ellipse((0.0, 0.0), (0.4, 0.4)), []
+    for groups in ((None, None), ("a", "b"), ("a", "a")):
+        settings = szlib.MPCSettings.among_people(time_limit=np.inf)
+        people = [
+            szlib.Person((4.0, y), group=group)
+            for y, group in zip((-1.4, 1.4), groups, strict=True)
+        ]
+        step = szlib.MPCCBF(zone, settings=settings).step(
+            (0.0, 0.0, 1.0, 0.0), (8.0, 0.0), people
+        )
+        sides.append(float(np.abs(step.ways[0].points[:, 1]).max()))
+    assert sides[0] == sides[1] < 1.0 and sides[2] > 1.4
