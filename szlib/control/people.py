@@ -130,7 +130,7 @@ class Prediction:
         object.__setattr__(self, "spread", np.broadcast_to(spread, n))
 
     def sample(self, person: Person, times: Array) -> Array:
-        """Offset of a `person` from constant velocity and growth of the zone at `times`, shape (n, 3) [m]."""
+        """Offset of a `person` from constant velocity and growth of the zone at `times`, (n, 3) [m]."""
         (x, y), (vx, vy) = person.position, person.velocity
         own, xy = np.asarray(self.times), np.asarray(self.positions)
         growth = SPREAD * np.asarray(self.spread)
