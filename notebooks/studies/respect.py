@@ -86,8 +86,9 @@ def nobody(asked: argparse.Namespace) -> list[dict[str, object]]:
 
 def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     tracks = noninteracting_crowd(seed=seed, people=500, minutes=30, bunch=bunch)
-    samples = szlib.find_encounters(tracks)
-    null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
+    place = {"area": szlib.ATC_SQUARE}
+    samples = szlib.find_encounters(tracks, **place)
+    null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False, **place)
     rows = []
     for name in ("all", "opposite, crossing"):
         data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])

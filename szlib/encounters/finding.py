@@ -24,7 +24,7 @@ import pandas as pd
 from ..tracks import funnels
 from ..tracks.clock import clock_index
 from .areas import AUTO, area_for, place_apart
-from .geometry import ATC_SQUARE, Area
+from .geometry import Area
 from .kinds import REACH, kinds_of_pairs, of_kind
 from .occupants import TrackRows, find_occupants, occupant_changes
 from .samples import sample_windows
@@ -103,14 +103,16 @@ def find_place(
 ) -> tuple[pd.DataFrame, Area]:
     """The `tracks`, and the area in which the `settings` find encounters.
 
-    With "auto" recordings without a calendar get each their own area, and are placed side by side.
+    Without one it is that of the files (`szlib.read_tracks`), or "auto". With "auto" recordings without a
+    calendar get each their own area, and are placed side by side.
     """
-    if settings.area == AUTO:
+    area = settings.area
+    if area is None:
+        area = tracks.attrs.get("area", AUTO)
+    if isinstance(area, str) and area == AUTO:
         clock_index(tracks)  # raises DataError for a table that is no track table
         tracks = place_apart(tracks)
-    return tracks, area_for(
-        tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space
-    )
+    return tracks, area_for(tracks, area, settings.space)
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ class EncounterSettings:
     area : where the attentional space must stay: a `Square`, a Shapely polygon, PedPy's ``WalkableArea``,
         text or a file, as for `szlib.as_area`; or "auto", the `szlib.walked_area` of the tracks, and of each
         recording that has no calendar (these are placed side by side, as their `reason` says).  None
-        stands for `ATC_SQUARE`; for files in another format than the ATC mall's it stands for "auto".
+        stands for `ATC_SQUARE` where the tracks are files of the ATC mall, else for "auto".
     space : the attentional space of the reference pedestrian.
     duration : of a window [s], a multiple of 0.1 (paper: 3).
     min_distance : of the other person when the window opens [m] (paper: 1).

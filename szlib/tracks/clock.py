@@ -72,6 +72,7 @@ def read_tracks(
     Returns
     -------
     The track table; its funnel is in ``.attrs["funnel"]``, and a DataWarning counts the rejected rows.
+    ``.attrs["area"]`` is the area of files of the ATC mall; other files have none.
 
     Raises
     ------
@@ -159,6 +160,7 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
         *funnels.get(raw),
         funnels.stage("clock: samples", len(t), covered, rejected),
     ]
+    table.attrs |= {k: raw.attrs[k] for k in ("area",) if k in raw.attrs}
     return funnels.attach(table, stages)
 
 

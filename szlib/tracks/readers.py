@@ -112,6 +112,9 @@ def merge(
     frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, names)))
     gaps = [file.layout.max_gap for file in files if file.layout.max_gap is not None]
     frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(files) else None
+    areas = {file.layout.area for file in files}
+    if len(areas) == 1 and (area := areas.pop()) is not None:
+        frame.attrs["area"] = [bound for bounds in area for bound in bounds]
     reasons = {"excluded day": merged.height - wanted.height, **doubled}
     stages = [stage for file in files for stage in file.stages]
     for text in find_implausible(rows):

@@ -319,7 +319,7 @@ def _inspect(options: argparse.Namespace) -> int:
         *(["--walls"] if options.walls else []),
     ]
     if isinstance(options.area, list):
-        words += ["--area", *map("{:g}".format, options.area)]
+        words += ["--area", *map("{:.12g}".format, options.area)]
     elif options.area:
         words += ["--auto"] if options.area == "auto" else ["--polygon", options.area]
     print("go on with:", f"{shlex.join(words)} {arguments(reading.as_json())}".strip())

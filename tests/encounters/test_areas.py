@@ -242,7 +242,7 @@ def test_square_given_as_polygon_gives_identical_encounters() -> None:
     found = 0
     for seed in range(6):
         tracks = make_crowd(seed)
-        expected = find_encounters(tracks)
+        expected = find_encounters(tracks, square=szlib.ATC_SQUARE)
         forms = [
             Region(ATC_POLYGON.wkt),
             ATC_POLYGON,
@@ -309,7 +309,7 @@ def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(
 def test_null_model_accepts_any_area() -> None:
     crowd = make_crowd(7, people=60, seconds=600)
     options = {"shifts": 2, "minutes": (0.2, 2.0), "progress": False}
-    expected = null_encounters(crowd, **options)
+    expected = null_encounters(crowd, square=szlib.ATC_SQUARE, **options)
     found = null_encounters(crowd, square=ATC_POLYGON, **options)
     pd.testing.assert_frame_equal(found.encounters, expected.encounters)
 
@@ -583,3 +583,15 @@ def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
     assert by_day(find_encounters(cache.tracks(), area=cache.find_area())) == alone
     given = DataCache(tmp_path / "given", list(map(str, files)), area="0 9 0 8")
     assert given.tracks()["x"].max() < 16
+
+
+def test_without_an_area_only_files_of_the_atc_mall_have_its_square(
+    tmp_path: Path,
+) -> None:
+    plaza = szlib.make_plaza(tmp_path / "plaza.csv", seed=1)
+    tracks = szlib.read_tracks(plaza)
+    assert find_encounters(tracks).attrs["area"] == str(szlib.ATC_SQUARE)
+    hall = tracks.assign(x=tracks["x"] + 100.0)[["t", "id", "x", "y"]]
+    hall.to_csv(tmp_path / "hall.csv", index=False)
+    own = find_encounters(szlib.read_tracks(tmp_path / "hall.csv"))
+    assert len(own) and own.attrs["area"] != str(szlib.ATC_SQUARE)

@@ -228,11 +228,14 @@ def test_days_separately_and_together_give_the_same() -> None:
     together = make_tracks(
         *(tracks.assign(day=day) for day, tracks in reversed(days.items()))
     )
-    alone = [find_encounters(tracks.assign(day=day)) for day, tracks in days.items()]
+    place = {"square": szlib.ATC_SQUARE}
+    alone = [
+        find_encounters(tracks.assign(day=day), **place) for day, tracks in days.items()
+    ]
     assert sum(len(samples) for samples in alone) > 0
     expected = pd.concat(alone)
     expected["encounter"] = np.arange(len(expected)) // 31
-    assert_same_samples(find_encounters(together), expected)
+    assert_same_samples(find_encounters(together, **place), expected)
 
 
 def test_block_size_does_not_matter(

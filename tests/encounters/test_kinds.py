@@ -206,11 +206,11 @@ def test_invalid_kinds_and_pairs_raise() -> None:
     with pytest.raises(
         szlib.DataError, match="unknown kinds 'friends'; expected some of"
     ):
-        find_encounters(tracks, kinds="friends")
+        find_encounters(tracks, square=ROOM, kinds="friends")
     with pytest.raises(szlib.DataError, match="unknown kinds"):
-        of_kind(find_encounters(tracks), [])
+        of_kind(find_encounters(tracks, square=ROOM), [])
     with pytest.raises(szlib.DataError, match="no column kind"):
-        of_kind(find_encounters(tracks).drop(columns="kind"), "strangers")
+        of_kind(find_encounters(tracks, square=ROOM).drop(columns="kind"), "strangers")
     with pytest.raises(szlib.DataError, match="not in these tracks"):
         encounter_kinds(tracks, PAIR.assign(other_id=7))
     with pytest.raises(szlib.DataError, match="other_id"):

@@ -103,7 +103,9 @@ def test_null_model_without_encounters_is_empty() -> None:
     tracks = make_tracks(
         make_walk((-12, 0), (1, 0)), make_walk((-12, 0), (1, 0), person=2, begin=1800)
     )
-    null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    null = szlib.null_encounters(
+        tracks, shifts=3, progress=False, square=szlib.ATC_SQUARE
+    )
     assert len(null.samples) == len(null.encounters) == 0
     assert null.shifts == 3
     assert len(null.one(2)) == 0

@@ -14,7 +14,10 @@ from szlib.tracks import funnels
 from szlib.zones import PairedSamples
 
 ZONE = szlib.Ellipse((0.15, 0.05), (0.9, 0.6), 0.3)
-MINUTES, SETTINGS = (1.0, 5.0), szlib.EncounterSettings(min_distance=0.3)
+MINUTES, SETTINGS = (
+    (1.0, 5.0),
+    szlib.EncounterSettings(area=szlib.ATC_SQUARE, min_distance=0.3),
+)
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +141,7 @@ def test_a_standing_person_has_no_zone_but_is_kept_out_of_others() -> None:
     walk = make_walk((-17, 0), (1.2, 0), duration=8)
     stand = make_walk((-14.5, 0.5), (0, 0.1), person=2, duration=8).assign(y=0.5)
     tracks = make_tracks(walk, stand)
-    samples = szlib.find_encounters(tracks)
+    samples = szlib.find_encounters(tracks, square=szlib.ATC_SQUARE)
     assert set(samples["other_id"]) == {2}
     paired = PairedSamples.from_samples(samples)
     assert np.isnan(paired.points[1]).all()

@@ -34,6 +34,7 @@ CALENDAR_BEGINS = 1e8
 # 2100-01-01; later time stamps are not seconds since 1970
 _LAST_SECOND = 4_102_444_800.0
 _FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
+_END = "\x1f"  # field at the end of each line
 _DAY, _MINUTE = 86_400, 60  # [s]
 
 # the format of a file, and a scan of its rows
@@ -68,7 +69,6 @@ class TrackFormat:
     is_sequence : whether each file is a recording of its own, without a calendar.
     is_in_metres : whether positions are in metres, whatever unit is given.
     has_known_columns : whether `ReadOptions.columns` is refused.
-    has_optional_end : whether the last field of a row may be missing.
     speed_field : number of the field that holds the sensor's speed, and its unit [m/s].
     """
 
@@ -93,7 +93,6 @@ class TrackFormat:
     is_streamed: bool = False
     is_sequence: bool = False
     is_in_metres: bool = False
-    has_optional_end: bool = False
     has_known_columns: bool = False
     speed_field: tuple[int, float] | None = None
 
@@ -247,12 +246,20 @@ class TrackFormat:
         return _with_exact_ids(self.scan_rows(plain))
 
     def scan_rows(self, plain: Path) -> pl.LazyFrame:
-        """Scan the lines of file `plain`: line, ragged and `columns`, as numbers or as `texts`."""
+        """Scan the lines of file `plain`: line, ragged and `columns`, as numbers or as `texts`.
+
+        A row is ragged if it has not exactly `n_fields` fields. To tell a blank field from a missing one,
+        each line of what is read as a whole gets one more field, `_END`.
+        """
         source: Path | io.BytesIO = plain
-        if self.separator == " ":  # any run of blanks
+        if not self.is_streamed:
             text = plain.read_bytes().removeprefix(codecs.BOM_UTF8)
-            lines = re.sub(rb"^[ \t\r]+|[ \t\r]+$", b"", text, flags=re.MULTILINE)
-            source = io.BytesIO(re.sub(rb"[ \t]+", b" ", lines))
+            text = text.replace(b"\r\n", b"\n").removesuffix(b"\n")
+            if self.separator == " ":  # any run of blanks
+                text = re.sub(rb"^[ \t\r]+|[ \t\r]+$", b"", text, flags=re.MULTILINE)
+                text = re.sub(rb"[ \t]+", b" ", text)
+            end = f"{self.separator}{_END}".encode()
+            source = io.BytesIO(text.replace(b"\n", end + b"\n") + end)
         numbers = {
             index for name, index in self.columns.items() if name not in self.texts
         }
@@ -267,9 +274,10 @@ class TrackFormat:
             missing_columns="insert", extra_columns="ignore", raise_if_empty=False, glob=False,
             row_index_name="line", row_index_offset=1 + self.has_header,
         )  # fmt: skip
-        ragged = pl.col("extra").is_not_null()
-        if not self.has_optional_end:
-            ragged |= pl.col(f"f{self.n_fields - 1}").is_null()
+        ragged = pl.col("extra").ne_missing(_END)
+        if self.is_streamed:
+            last = pl.col(f"f{self.n_fields - 1}")
+            ragged = pl.col("extra").is_not_null() | last.is_null()
         named = {name: pl.col(f"f{index}") for name, index in self.columns.items()}
         if "day" in named:
             named["day"] = named["day"].str.strip_chars(' "')

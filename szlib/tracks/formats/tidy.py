@@ -37,7 +37,6 @@ class _Table(TrackFormat):
     """Text whose first line names the columns, or whose columns `ReadOptions.columns` counts."""
 
     is_ambiguous: bool = True
-    has_optional_end: bool = True
 
     def recognises(self, head: bytes) -> bool:
         """True for any `head`: what no other format recognises is read as a table."""
@@ -254,7 +253,15 @@ def open_database(
     Raises DataError where not exactly one of its tables can be read with `options`.
     """
     readable, refused = [], []
-    with closing(sqlite3.connect(plain)) as file:
+    journal = path.with_name(f"{path.name}-wal")
+    if journal.is_file() and journal.stat().st_size:
+        raise DataError(
+            f"{path}: {journal.name} holds changes that are not in the file yet; close the program that "
+            f"writes it, or run: sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
+        )
+    # nothing is written, not even a journal
+    address = f"{plain.absolute().as_uri()}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(address, uri=True)) as file:
         try:
             names = [
                 name
