@@ -129,7 +129,7 @@ def test_the_commands_and_programs_of_the_page_of_decisions_run(
 ):
     monkeypatch.chdir(tmp_path)
     tracks = szlib.read_tracks(
-        szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=120))
+        szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=400))
     )
     hall = tracks.assign(
         Frame=(25 * (tracks["t"] - tracks["t"].min())).round().astype(int)

@@ -126,7 +126,12 @@ def _as_table(
 ) -> pd.DataFrame:
     """The rows as a table as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(
-        path, layout, blocks.n_usable, dict(blocks.reasons), blocks.first_fault
+        path,
+        layout,
+        blocks.n_usable,
+        dict(blocks.reasons),
+        blocks.first_fault,
+        max_rejected=options.max_rejected,
     )
     if options.metres is None:
         check_unit(pl.DataFrame({"x": [blocks.farthest], "y": [0.0]}), layout, path)

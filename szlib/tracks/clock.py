@@ -67,7 +67,7 @@ def read_tracks(
     options : how files are read; None takes the defaults.
     exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
     parameters : single values in place of those of `options`: file_format, unit, scale, frame_rate, columns,
-        max_gap, tz, each as in `szlib.ReadOptions`; None leaves that of `options`.
+        max_gap, tz, max_rejected, each as in `szlib.ReadOptions`; None leaves that of `options`.
 
     Returns
     -------

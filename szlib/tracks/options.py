@@ -58,6 +58,8 @@ class ReadOptions:
         raw 0.5, ATC 1 Hz 1.6; EWAP 2.25 sampling intervals; tidy 4 of them, at least 0.5 and at most 5).
     tz : time zone whose calendar gives the day of a time stamp, and of times without a zone; None takes that
         of the file's times, else UTC (ATC: Asia/Tokyo).
+    max_rejected : share of the rows of a file that may be unusable, from 0 to 1; more are an error; None
+        takes 0.05.
 
     Raises
     ------
@@ -82,9 +84,10 @@ class ReadOptions:
     columns: Columns | None = None
     max_gap: float | None = None
     tz: str | None = None
+    max_rejected: float | None = None
 
     def __post_init__(self) -> None:
-        rate, gap = self.frame_rate, self.max_gap
+        rate, gap, most = self.frame_rate, self.max_gap, self.max_rejected
         length = "metres in one unit of position, more than 0"
         count = f"frames a second from 1 to {_FASTEST_COUNT:g}"
         for name, is_valid, expected in (
@@ -101,6 +104,7 @@ class ReadOptions:
                 gap is None or gap > SHORTEST_GAP,
                 "longer than the clock's 0.1 s",
             ),
+            ("max_rejected", most is None or 0 <= most <= 1, "from 0 to 1"),
         ):
             require(is_valid, name, getattr(self, name), expected)
         if self.unit and self.scale:

@@ -7,6 +7,7 @@ A file that cannot be used raises a DataError that names the file and the line.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,19 @@ import pandas as pd
 import polars as pl
 
 from ..errors import DataError, warn
+from ..input_files import printable
 from . import funnels
 from .formats import TrackFormat, open_file
 from .formats.base import EXPECTED, MISSING
 from .formats.tidy import is_table, open_table
-from .options import ReadOptions
+from .options import ReadOptions, advise
 from .plausibility import check_people, check_unit, find_implausible, suggest_reading
 from .recordings import LoadedFile, separate_recordings
+
+MAX_REJECTED = 0.05
+"""Share of the rows of a file that may be unusable, unless `ReadOptions` give another (assumed)."""
+MOST_DOUBLED = 0.2
+"""Share of rows up to which a person may have a second place at one time (assumed)."""
 
 
 def read_raw(
@@ -91,7 +98,15 @@ def merge(
     keys = ["day", "id", "t"]
     rows = _sort(wanted)
     again = pl.all_horizontal(pl.col(keys).eq_missing(pl.col(keys).shift()))
+    elsewhere = again & pl.any_horizontal(pl.col("x", "y").diff() != 0)
     if rows.select(again.any()).item():
+        if (n := rows.select(elsewhere.sum()).item()) > MOST_DOUBLED * rows.height:
+            names = ", ".join(printable(file.path.name) for file in files[:3])
+            raise DataError(
+                f"{names}: {n:,} of {rows.height:,} rows give a person a second place at one time; name the "
+                "column of the recording, as columns={'day': ...}, or one with the whole time: seconds "
+                "without their fraction are not enough"
+            )
         rows = rows.filter(~again)
     doubled = {"duplicate (day, id, t)": wanted.height - rows.height}
     _warn_rejected("all files", doubled)
@@ -165,7 +180,8 @@ def _read_file(source: Any, path: Path, options: ReadOptions) -> LoadedFile:
         if layout.is_ambiguous and 2 * good.height < rows.height
         else ""
     )
-    stage = read_stage(path, layout, good.height, reasons, first, hint)
+    most = options.max_rejected
+    stage = read_stage(path, layout, good.height, reasons, first, hint, most)
     if layout.is_ambiguous:
         check_people(good, layout, path, is_unit_given=options.metres is not None)
     if options.metres is None:
@@ -202,6 +218,7 @@ def read_stage(
     reasons: dict[str, int],
     first: tuple[int, str] | None,
     hint: str = "",
+    max_rejected: float | None = None,
 ) -> dict[str, Any]:
     """The funnel stage of one file.
 
@@ -212,13 +229,18 @@ def read_stage(
     reasons : number of rejected rows by reason.
     first : line and reason of the first rejected row.
     hint : what to do, if most rows are rejected.
+    max_rejected : as in `szlib.ReadOptions`.
 
     Raises
     ------
-    DataError : more rows are rejected than usable, or there is none.  Fewer are a DataWarning.
+    DataError : more than `max_rejected` of the rows are rejected, or there is none.  Fewer are a DataWarning.
     """
     n_bad = sum(reasons.values())
-    if first and n_bad > n_good:
+    most = MAX_REJECTED if max_rejected is None else max_rejected
+    if first and n_bad > most * (n_bad + n_good):
+        share = ceil(100 * n_bad / (n_bad + n_good)) / 100
+        if not hint and n_good:
+            hint = f"if the others are right: {advise(max_rejected=share)}"
         raise DataError(
             f"{path}, line {first[0]}: {first[1]}; {n_bad} of {n_bad + n_good} rows cannot be used "
             f"as {layout.name}; {hint or EXPECTED}"

@@ -151,7 +151,15 @@ def _read_options(options: argparse.Namespace) -> dict[str, Any]:
         columns[name.strip()] = (
             int(column) if column.isdecimal() and column.isascii() else column.strip()
         )
-    names = ("unit", "scale", "frame_rate", "tz", "file_format", "max_gap")
+    names = (
+        "unit",
+        "scale",
+        "frame_rate",
+        "tz",
+        "file_format",
+        "max_gap",
+        "max_rejected",
+    )
     given = {
         "columns": columns or None,
         **{name: getattr(options, name) for name in names},

@@ -6,6 +6,7 @@ import gzip
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -400,3 +401,72 @@ def test_a_database_is_not_changed_and_what_is_not_in_it_yet_is_said(
     path.chmod(0o444)
     assert len(szlib.read_tracks(path)) >= 80
     assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
+
+
+def in_two_recordings(column: str, later: float) -> pd.DataFrame:
+    """Six people on their ways, twice, under the same ids; the second time so many seconds later."""
+    parts = []
+    for k, name in enumerate(("A", "B")):
+        rows = in_seconds(people(k, count=6))
+        parts.append(rows.assign(t=rows["t"] + k * later, **{column: name}))
+    return pd.concat(parts, ignore_index=True)
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "table", "sqlite"])
+@pytest.mark.parametrize(
+    ("column", "later"), [("scene", 0.0), ("scene", 500.0), ("anything", 0.0)]
+)
+def test_a_column_that_tells_recordings_apart_is_asked_about(
+    tmp_path: Path, form: str, column: str, later: float
+) -> None:
+    table = in_two_recordings(column, later)
+    source: Any = tmp_path / f"hall.{form}"
+    if form == "csv":
+        table.to_csv(source, index=False)
+    elif form == "parquet":
+        table.to_parquet(source)
+    elif form == "table":
+        source = table
+    else:
+        with sqlite3.connect(source) as file:
+            table.to_sql("tracks", file, index=False)
+        file.close()
+    with pytest.raises(szlib.DataError, match=f"column '{column}' changes where"):
+        szlib.read_tracks(source)
+    found = szlib.read_tracks(source, columns={"day": column})
+    assert found.groupby("day", observed=True)["id"].nunique().tolist() == [6, 6]
+
+
+def test_a_column_that_tells_no_recordings_apart_is_not_asked_about(
+    tmp_path: Path,
+) -> None:
+    table = in_two_recordings("kind", 0.0).iloc[: len(in_seconds(people(0, count=6)))]
+    table["scene"], table["speed"] = "A", np.linspace(0, 1, len(table))
+    assert szlib.read_tracks(table)["id"].nunique() == 6
+    table["scene"] = np.where(table["id"] % 2, "left", "right")
+    assert szlib.read_tracks(table)["id"].nunique() == 6
+
+
+def test_most_people_in_two_places_at_once_are_an_error_not_a_warning(
+    tmp_path: Path,
+) -> None:
+    """A clock of whole seconds, beside one of nanoseconds that is not read."""
+    table = in_seconds(people(0, count=6))
+    rest = (table["t"] % 1 * 1e9).round().astype(int)
+    seconds = table.assign(t=table["t"] // 1, nanosec=rest)
+    with pytest.raises(szlib.DataError, match="second place at one time"):
+        szlib.read_tracks(seconds)
+    twice = pd.concat([table, table])
+    with pytest.warns(szlib.DataWarning, match="duplicate"):
+        assert szlib.read_tracks(twice)["id"].nunique() == 6
+
+
+def test_ids_that_are_one_number_in_two_writings_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "ids.csv"
+    for one, other in (("01", "1"), ("1e3", "1000")):
+        rows = [
+            f"{k / 10},{i},{k / 10},{i[-1]}" for k in range(30) for i in (one, other)
+        ]
+        path.write_text("\n".join(["t,id,x,y", *rows]))
+        with pytest.raises(szlib.DataError, match="are the same number"):
+            szlib.read_tracks(path)

@@ -227,7 +227,7 @@ def test_ewap_files_of_one_name_are_refused(tmp_path: Path) -> None:
 
 # --- rejected rows -----------------------------------------------------------------------------------
 
-GOOD = as_1hz(samples(people=1, count=8)).splitlines()
+GOOD = as_1hz(samples(people=1, count=60)).splitlines()
 BAD_ROWS = {
     "1351040400.4,7,5,5,1.2": "missing or extra fields",
     "1351040400.4,7,5,5,1.2,0.1,9": "missing or extra fields",
@@ -288,19 +288,25 @@ def test_every_format_gives_the_line_of_a_bad_row(
     )
 
 
-def test_a_file_of_mostly_bad_rows_is_refused(tmp_path: Path) -> None:
-    frame, message = read_quietly(
-        write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"]))
-    )
+def test_a_file_with_more_than_a_twentieth_of_bad_rows_is_refused(
+    tmp_path: Path,
+) -> None:
+    path = write(tmp_path / "a.csv", "\n".join([*GOOD[:57], "x", "y", "z"]))
+    frame, message = read_quietly(path)
     assert (len(frame), message) == (
-        3,
-        "a.csv, first at line 4: rejected rows: 3 x missing or extra fields",
+        57,
+        "a.csv, first at line 58: rejected rows: 3 x missing or extra fields",
     )
+    path = write(tmp_path / "a.csv", "\n".join([*GOOD[:56], "x", "y", "z"]))
     with pytest.raises(
         szlib.DataError,
-        match=r"a\.csv, line 4: missing or extra fields; 4 of 7 rows cannot be",
+        match=r"a\.csv, line 57: missing or extra fields; 3 of 59 rows cannot be .*max_rejected=0\.06",
     ):
-        read_raw(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z", "x"])))
+        read_raw(path)
+    with pytest.warns(szlib.DataWarning, match="3 x missing"):
+        assert len(read_raw(path, options=szlib.ReadOptions(max_rejected=0.06))) == 56
+    with pytest.raises(szlib.DataError, match="max_rejected must be from 0 to 1"):
+        szlib.ReadOptions(max_rejected=2)
 
 
 def test_rows_without_a_day_are_rejected(tmp_path: Path) -> None:
@@ -497,10 +503,12 @@ def test_streamed_people_whose_ids_are_too_large_for_floats_stay_two(
     "text", ["9007199254740993.0", "9007199254740992.0", "1e16", str(2**63), "-1e300"]
 )
 def test_ids_that_are_not_exact_are_rejected_by_line(tmp_path: Path, text: str) -> None:
-    lines = [*GOOD, f"{BEGIN + 4},{text},5,5,1.2,0.1"]
+    lines = [*GOOD, f"{BEGIN + 40},{text},5,5,1.2,0.1"]
     frame, message = read_quietly(write(tmp_path / "a.csv", "\n".join(lines)))
-    assert message == "a.csv, first at line 9: rejected rows: 1 x id not a whole number"
-    assert len(frame) == 8
+    assert (
+        message == "a.csv, first at line 61: rejected rows: 1 x id not a whole number"
+    )
+    assert len(frame) == 60
     floats = LARGE.assign(id=LARGE["id"].astype(float))
     floats.to_parquet(tmp_path / "a.parquet")
     with pytest.raises(

@@ -312,7 +312,10 @@ def test_samples_with_encounters_pass_unchanged():
 
 @pytest.mark.usefixtures("without_kernels")
 def test_run_stops_when_no_encounters_are_left(notebooks, tmp_path, capsys):
-    look = "import szlib\nrecord.cache.store_encounters(szlib.find_encounters(record.cache.tracks()))"
+    look = (
+        "import szlib\nsamples = szlib.find_encounters(record.cache.tracks(), area=szlib.ATC_SQUARE)\n"
+        "record.cache.store_encounters(samples)"
+    )
     notebooks(
         _01_fine='record.check("ok", True)',
         _02_nobody=look,

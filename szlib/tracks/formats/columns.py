@@ -41,6 +41,13 @@ _SECONDS = {
     "ns": 1e-9,
 }  # in a unit of time
 _PIXELS = ("px", "pixel", "pixels")
+_RECORDINGS = frozenset({
+    "recording", "recordingid", "scene", "sceneid", "camera", "cameraid", "cam", "session", "sessionid",
+    "sequence", "sequenceid", "video", "videoid", "date", "run", "runid", "trial", "trialid", "experiment",
+    "clip", "place", "location", "locationid", "site", "dataset",
+})  # fmt: skip
+# people have so many rows under each value that tells recordings apart
+_LONGEST_SHARE = 5
 _GUESSED = 6  # number of columns that are tried out, as whose people walk
 _Format = TypeVar("_Format", bound=TrackFormat)
 
@@ -129,6 +136,53 @@ def find_columns(
             f"{quantity} = {names[k] or k}" for quantity, k in taken.items()
         ),
     )
+
+
+def ask_about_recordings(
+    layout: TrackFormat,
+    t: pl.Series,
+    ids: pl.Series,
+    column: Callable[[int], pl.Series],
+    where: str,
+    *,
+    by_name: bool,
+) -> None:
+    """Raise DataError where an unused column tells recordings apart that would be mixed.
+
+    Such a column has few values, and changes where people are at one time twice, or go back in time. With
+    `by_name` one is also asked about if it has a usual name, and people are seen under several of its values.
+
+    Parameters
+    ----------
+    layout : the format, with the columns that are used.
+    t, ids : times and ids of all rows.
+    column : gives another column.
+    where : the beginning of the message.
+    """
+    rows = pl.DataFrame({"id": ids, "t": t})
+    is_mixed = _begins_again(rows, ["id"])
+    for k in sorted(set(range(layout.n_fields)) - set(layout.columns.values())):
+        name = layout.names[k]
+        is_usual = by_name and _split_unit(name)[0] in _RECORDINGS
+        if not (is_mixed or is_usual):
+            continue
+        table = rows.with_columns(c=column(k).cast(pl.String))
+        n_pieces = table.select("id", "c").n_unique()
+        if table["c"].n_unique() < 2 or n_pieces * _LONGEST_SHARE > len(rows):
+            continue
+        is_shared = n_pieces > rows["id"].n_unique()
+        if is_shared and (is_usual or not _begins_again(table, ["id", "c"])):
+            raise DataError(
+                f"{where}: column {name or k!r} changes where people or times begin again, so it seems to "
+                f"tell recordings apart; {advise(columns={'day': name or k})}; "
+                "if it does not, name the columns of id, x and y"
+            )
+
+
+def _begins_again(rows: pl.DataFrame, keys: list[str]) -> bool:
+    """Whether somebody is seen twice at one time, or goes back in time, among rows of the same `keys`."""
+    step = rows.select(pl.col("t").diff().over(keys)).to_series()
+    return bool((step <= 0).any())
 
 
 def _split_unit(name: str) -> tuple[str, str]:

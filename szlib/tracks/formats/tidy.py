@@ -6,6 +6,7 @@ However a table comes, its columns are found by `columns.find_columns`, and thei
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -24,9 +25,9 @@ from ... import memory
 from ...errors import DataError
 from ..options import ReadOptions
 from .base import TrackFormat, decode_first_line, decode_line, is_number, scan_table
-from .columns import find_columns
+from .columns import ask_about_recordings, find_columns
 from .unpack import BYTES_PER_ROW, LONGEST_LINE, require_memory
-from .values import to_ids, to_numbers, to_times
+from .values import require_distinct_ids, to_ids, to_numbers, to_times
 
 _SAMPLE = 2000  # rows in which columns are guessed
 _FIRST = 20  # lines of a text that show what its columns hold
@@ -84,12 +85,26 @@ class _Table(TrackFormat):
         }
         texts = {name for name, k in found.columns.items() if k in is_text}
         found = replace(found, texts=frozenset(texts | {"day", "id"}))
-        return found.with_values(found.scan_rows(plain).collect(), options)
+
+        def column(k: int) -> pl.Series:
+            """The texts of a column."""
+            one = replace(found, columns={"c": k}, texts=frozenset("c"))
+            return one.scan_rows(plain).collect()["c"]
+
+        rows = found.scan_rows(plain).collect()
+        return found.with_values(rows, options, f"{path}", column)
 
     def with_values(
-        self, rows: pl.DataFrame, options: ReadOptions
+        self,
+        rows: pl.DataFrame,
+        options: ReadOptions,
+        where: str,
+        column: Callable[[int], pl.Series],
     ) -> tuple[Self, pl.LazyFrame]:
-        """The format completed with what its times are, and a scan of `rows` as from `TrackFormat.open`."""
+        """The format completed with what its times are, and a scan of `rows` as from `TrackFormat.open`.
+
+        `where` is the name of the table in messages; `column` gives another one of its columns.
+        """
         decimal = "," if self.separator in (";", "\t", " ") else "."
         found, t = self, rows["t"]
         if self.time_unit is not None and 2 * to_numbers(
@@ -108,9 +123,12 @@ class _Table(TrackFormat):
             ):
                 rows = rows.with_columns(day=times.day)
         x, y = (to_numbers(rows[name], decimal) for name in "xy")
-        return found, scan_table(
-            rows.with_columns(t=t, id=to_ids(rows["id"]), x=x, y=y)
-        )
+        ids = to_ids(rows["id"])
+        require_distinct_ids(ids, where)
+        if "day" not in rows.columns:
+            is_told = {"id", "x", "y"} <= set(options.columns or {})
+            ask_about_recordings(found, t, ids, column, where, by_name=not is_told)
+        return found, scan_table(rows.with_columns(t=t, id=ids, x=x, y=y))
 
 
 @dataclass(frozen=True)
@@ -151,8 +169,14 @@ class _ArrowTable(_Table):
                 f"{path}: damaged {kind} ({error}); fetch or write the file again"
             ) from error
         named = {name: table[names[at]] for name, at in found.columns.items()}
+
+        def column(k: int) -> pl.Series:
+            """A column of the file."""
+            return pl.DataFrame(data.to_table(columns=[names[k]])).to_series()
+
         # without metadata
-        return found.with_values(pl.DataFrame(pa.table(named)), options)
+        rows = pl.DataFrame(pa.table(named))
+        return found.with_values(rows, options, f"{path}", column)
 
 
 TIDY = _Table("tidy", has_header=True)
@@ -212,7 +236,7 @@ def open_table(
     try:
         found = find_columns(TABLE, names, options, shown, sample)
         rows = pl.DataFrame({name: column(at) for name, at in found.columns.items()})
-        found, scan = found.with_values(rows, options)
+        found, scan = found.with_values(rows, options, f"{where}", column)
     except DataError:
         raise
     except (

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 import polars as pl
 
+from ...errors import DataError
+
 # Times without a unit that are larger than this are counts since 1970, in units of so many seconds: as
 # seconds they would be later than the year 5000.
 _SINCE_1970 = {
@@ -106,6 +108,24 @@ def to_ids(values: pl.Series) -> pl.Series:
         pd.util.hash_array(names.to_numpy().astype(object), categorize=False) >> _SHORT
     )
     return text.replace_strict(names, pl.Series(numbers.astype("int64")), default=None)
+
+
+def require_distinct_ids(ids: pl.Series, where: str) -> None:
+    """Raise DataError, beginning with `where`, if two of `ids` that differ as texts are one number."""
+    if ids.dtype != pl.String:
+        return
+    known = pl.DataFrame({"text": ids.drop_nulls().unique().sort()})
+    whole = pl.col("text").cast(pl.Int64, strict=False)
+    other = pl.col("text").cast(pl.Float64, strict=False).cast(pl.Int64, strict=False)
+    number = pl.coalesce(whole, other)
+    alike = known.with_columns(number=number).drop_nulls()
+    alike = alike.filter(pl.col("number").is_duplicated()).sort("number", "text")
+    if alike.height:
+        one, other = alike["text"].head(2)
+        raise DataError(
+            f"{where}: the ids {one!r} and {other!r} are the same number; write them alike if they are one "
+            f"person, else as names, such as 'p{one}' and 'p{other}'"
+        )
 
 
 def _scale(numbers: pl.Series) -> Times:
