@@ -17,6 +17,7 @@ from szlib.zones import respect, verdict
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "notebooks" / "which_settings.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -247,6 +248,64 @@ def test_the_numbers_of_the_page_are_those_of_the_tables():
         f"{steps['rest']:,} steps of 2,000 random worlds had none, of the defaults {steps['szlib']}"
         in text
     )
+
+
+def test_the_five_results_are_those_of_the_tables():
+    """Each number of the list is made anew from its table."""
+    text = " ".join(README.split("## Five results")[1].split("\n## ")[0].split())
+    sizes = table("25_sizes").set_index("plazas").loc[1]
+    assert 100 * sizes["error_m"] < 4 and f"({sizes['encounters']:,.0f} enc" in text
+
+    sites = table("06_sites").query("min_distance == 1 and kinds == 'strangers'")
+    for site, words in (
+        ("atc-1hz", "{} on a day of the ATC mall"),
+        ("grand-central", "{} at Grand Central"),
+    ):
+        row = sites.set_index("site").loc[site]
+        radius = f"{row['radius']:.2f} m ({row['radius_low']:.2f} to {row['radius_high']:.2f})"
+        assert words.format(radius) in text
+        assert f"{row['shifts']:.0f}" in text.split("smallest p that ")[1]
+        assert row["p_value"] == pytest.approx(1 / (1 + row["shifts"]), abs=1e-5)
+
+    ahead = table("25_claims").query(
+        "data == 'ATC day' and claim == 'the zone reaches farther ahead than behind'"
+    )
+    n = ahead.set_index("method")["n"]
+    assert ahead["verdict"].str.startswith("not decidable").all()
+    assert (
+        f"{n['respect, strangers']}, {n['quantile, strangers']} and {n['quantile, null model']} enc"
+        in text
+    )
+
+    rule = table("03_outliers").query(
+        "intruders == 0.0025 and rule == '0.2 %, 20 neighbours'"
+    )
+    own_size = rule.query("plazas == 6")
+    low, high = 100 * own_size["error"].min(), 100 * own_size["error"].max()
+    assert f"{low:.0f} to {high:.0f} cm off" in text
+    assert f"at {own_size['encounters'].min():,} encounters" in text
+
+    ours = (
+        table("21_rollouts").query("set == 'all'").set_index("formulation").loc["szlib"]
+    )
+    below = [100 * ours[name] for name in ("share h < 0", "low h < 0", "high h < 0")]
+    assert (
+        f"In {ours['worlds']:,} random worlds h < 0 occurred in {{:.2f}} % ({{:.2f}} to {{:.2f}})".format(
+            *below
+        )
+        in text
+    )
+    assert ours["unflagged_violations"] == 0 and "never after a step" in text
+    walkers = (
+        table("29_walkers")
+        .query("crowd == 'all recorded' and speed == '1 m/s' and metric == 'reached'")
+        .set_index("controller")
+    )
+    mean, low, high = (
+        100 * walkers.loc["among people", name] for name in ("mean", "low", "high")
+    )
+    assert f"reached {mean:.1f} % of goals ({low:.1f} to {high:.1f})" in text
+    assert f"the defaults {100 * walkers.loc['MPC-CBF', 'mean']:.0f} %" in text
 
 
 def test_a_citation_has_what_bibtex_needs(site):
