@@ -268,22 +268,22 @@ record.check("no inlier is inside the zone of its own speed", margin > -1e-9, fo
 
 
 # %% jupyter={"source_hidden": true}
-# How large slice and zone are at each speed
+# How large the zone is at each speed, and how far it reaches in each direction
 def enclosed(curve):
     x, y = np.vstack([curve, curve[:1]]).T
     return 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
 
 
-grid, areas, slices = np.linspace(low, high, 63)[1:-1], [], []
+grid, areas, reaches = np.linspace(low, high, 63)[1:-1], [], []
 for v in grid:
     try:
         cut = hulls.slice_hull(vertices, v, r_max=r_max)
         areas.append(enclosed(cut.boundary(theta)))
-        slices.append(enclosed(cut.polygon))
+        reaches.append(np.hypot(*cut.boundary(theta).T))
     except szlib.ZoneError:  # nobody was seen on some side
         areas.append(np.nan)
-        slices.append(np.nan)
-areas, slices = np.array(areas), np.array(slices)
+        reaches.append(np.full(len(theta), np.nan))
+areas, reaches = np.array(areas), np.array(reaches)
 smallest = float(grid[np.nanargmin(areas)])
 known = grid[np.isfinite(areas)]
 tenths = np.arange(np.floor(10 * low) / 10, high + 0.1, 0.1)
@@ -324,19 +324,19 @@ Number of encounters in the last 0.1 m/s: {people[int((known[-1] - tenths[0]) / 
 )
 
 # %% [markdown]
-# ### Theory: why there is one smallest zone
+# ### Theory: why the zone grows to both sides
 #
-# The slices of a convex body obey the **Brunn-Minkowski inequality**: the square root of their area is a concave
-# function of the height at which the body is cut (here: of the speed). A concave function rises to one maximum and falls
-# after it. So one slice is the largest, and from its speed on the zone grows to both sides. The data decides *which*
-# speed that is: it is near the speeds at which people came nearest.
+# Look in one direction. The hull is convex, so it holds the straight line between any two of its points, also between
+# points at different speeds. Hence its edge R' in this direction is a **concave** function of the speed: it rises to one
+# maximum, and falls after it. The zone reaches r_max - R', which is **convex**: it falls to one minimum, and rises after
+# it. So in each direction there is one speed at which the zone is smallest, and it grows to both sides of it. The
+# data decides *which* speed that is: it is near the speeds at which people came nearest.
 
 # %% jupyter={"source_hidden": true}
 # Checks
-root = np.sqrt(slices)
-bend = float(np.nanmax(root[2:] - 2 * root[1:-1] + root[:-2]))
-claim = "the square root of the slice's area is concave in the speed"
-record.check(claim, bend < 1e-6, f"largest second difference {bend:.1g} m", always=True)
+bend = float(np.nanmin(reaches[2:] - 2 * reaches[1:-1] + reaches[:-2]))
+claim = "in every direction the reach of the zone is convex in the speed"
+record.check(claim, bend > -1e-6, f"least second difference {bend:.1g} m", always=True)
 between = areas[(grid >= 0.7) & (grid <= 1.3)]
 covered = grid[0] <= 0.7 and grid[-1] >= 1.3
 record.key["smallest zone at"] = smallest

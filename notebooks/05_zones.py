@@ -478,9 +478,9 @@ Markdown(
 # What we know now
 first, last = (found["quantile"][n]["a"] for n in (min(found["quantile"]), max(found["quantile"])))
 Markdown(
-    f"""**What we know now.** At {zone_speed:g} m/s all but {100 * q:g} % of the encounters stay outside of
-{kept.semi_axes[0]:.2f} m x {kept.semi_axes[1]:.2f} m, and other people would have given {row["a_low"]:.2f} to
-{row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
+    f"""**What we know now.** At {zone_speed:g} m/s the zone is {kept.semi_axes[0]:.2f} m x {kept.semi_axes[1]:.2f} m. In each
+direction some {100 * q:g} % of the encounters come nearer; somewhere, more than {100 * q:g} % do, because they are others in each
+direction. Other people would have given {row["a_low"]:.2f} to {row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
 semi-axis changed by {100 * (last - first):+.0f} cm. The verdict is *{verdict}*, and the zone is stored in `zone.json`: the robot of
 chapters 07 to 13 reads it there. Do people keep out of this zone, or is it only empty? Chapter 06 asks."""
 )

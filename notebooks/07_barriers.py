@@ -210,7 +210,7 @@ for dt in (0.1, 0.05, 0.02):
 # **How large may gamma be?** On the limit, $v = \gamma h/\Delta t$. As $h$ shrinks at the rate $v$, the robot has to
 # brake at $\gamma v/\Delta t$. With gamma = 0.05 and 1 m/s that is 0.5 m/s². The robot can brake at
 # $a_{max}$ = 1 m/s², so this is possible. With gamma = 0.2 it is 2 m/s², which is impossible. For a person who
-# stands, the rule is
+# stands, and a robot that looks two steps ahead, the rule is
 #
 # $$\gamma \le \frac{a_{max}\,\Delta t}{v_{max}} = \frac{1\ \mathrm{m/s^2} \cdot 0.1\ \mathrm{s}}{1\ \mathrm{m/s}} = 0.1$$
 #
@@ -254,7 +254,7 @@ for (n, run), line, colour in zip(
     runs.items(), ("-", "--", "-."), figures.pick_colours(list(runs)), strict=True
 ):
     h, v, a = run.T
-    ax.plot(h, v, line, color=colour, label=f"N_h = {n}: least h {100 * h.min():.0f} cm")
+    ax.plot(h, v, line, color=colour, label=f"N_h = {n}: least h {round(100 * h.min())} cm")
     ax.plot(h[np.isnan(a)], v[np.isnan(a)], "x", color=colour)
 ax.plot([], [], "kx", label="no acceleration obeys eq. 1")
 ax.plot([0, 0.6], [0, 1.2], color=figures.RED, linewidth=1, label="limit gamma h / dt")
@@ -272,15 +272,19 @@ without = {n: int(np.isnan(run[:, 2]).sum()) for n, run in runs.items()}
 lows = {n: float(run[:, 0].min()) for n, run in runs.items()}
 evidence = f"least h {lows[1]:.2f} m and {lows[8]:.2f} m"
 too_late = without[1] > 0 and lows[1] < 0
+gentle = [int(np.isnan(drive(0.1, n)[:, 2]).sum()) for n in (1, 2)]
 record.check("with gamma = 0.2 and N_h = 1 the robot enters the zone", too_late, evidence, always=True)
 enough = without[8] == 0 and lows[8] >= 0
 record.check("with gamma = 0.2 and N_h = 8 every step has a solution", enough, evidence, always=True)
+shown = f"{gentle[0]} and {gentle[1]} steps without a solution"
+record.check("gamma <= a_max dt / v_max needs N_h >= 2", gentle[1] == 0 < gentle[0], shown, always=True)
 Markdown(
     "<details><summary>Answer</summary>\n\n"
     f"With $N_h = 1$ it begins to brake at h = {runs[1][np.isnan(runs[1][:, 2])][0, 0]:.2f} m. From 1 m/s it needs 0.50 m to stop, "
     f"so it enters the zone by {-lows[1]:.2f} m. With $N_h = 2$, {without[2]} steps have no solution, but full braking is just in time. With "
-    "$N_h = 8$ every step has a solution. A smaller gamma helps as well: it brakes early and gently. The paper takes "
-    "$N_h = 2$; with gamma = 0.05 that is enough for one person who stands. Notebook 21 shows where it is not.\n\n</details>"
+    "$N_h = 8$ every step has a solution. A smaller gamma helps as well: it brakes early and gently. But it does not replace the "
+    f"second step: with gamma = 0.1, which the rule allows, and $N_h = 1$, {gentle[0]} steps have no solution, with $N_h = 2$ {gentle[1]}. The "
+    "paper takes $N_h = 2$. Notebook 21 shows where that is not enough.\n\n</details>"
 )
 
 # %% [markdown]

@@ -126,12 +126,10 @@ def free_room(width, zone_sideways=0.75, robot=0.5, margin=0.05):
 
 room = free_room(4.6)
 print(f"{100 * room:.0f} cm; in the middle of it h is {100 * room / 2:.0f} cm to the zone and to the wall")
-print(f"with gamma = 0.05 it may approach either of them at {0.05 * room / 2 / 0.1:.2f} m/s")
 
 # %% [markdown]
-# Compare the last number with the slowest speed in the table above.
-
-# %% [markdown]
+# So it can pass, with little room. How slow it becomes there depends on who limits it.
+#
 # ## Person or wall?
 #
 # **What do you think?** Take the walls away: how slow does the robot become beside the person? Put them back, and

@@ -228,7 +228,7 @@ record.check(
 #
 # | `method` | the zone is where | with more people |
 # |---|---|---|
-# | `"quantile"` | all but 5 % of encounters keep out | stable |
+# | `"quantile"` | in each direction 5 % of the encounters come nearer | stable |
 # | `"hull"` | nobody ever was | shrinks: one careless person is enough |
 # | `"respect"` | careful people keep out, compared with people who ignore each other | stable; needs a null model |
 #

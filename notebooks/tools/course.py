@@ -171,7 +171,7 @@ GLOSSARY: dict[str, Word] = {
         "precision",
         new=False,
     ),
-    "quantile zone": Word("the zone that all but a share q of the encounters stay outside of", new=False),
+    "quantile zone": Word("the zone that, in each direction, a share q of the encounters enters", new=False),
     "reference pedestrian": Word("the person of an encounter from whom we look at the other"),
     "respect zone": Word(
         "the ellipse that careful people keep out of, compared with people who ignore each other", new=False
