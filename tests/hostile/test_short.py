@@ -28,6 +28,7 @@ POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
         "damaged_tracks",
         "files",
         "races",
+        "reading",
         "terminal",
         "adversary",
         "among_people",

@@ -470,3 +470,13 @@ def test_ids_that_are_one_number_in_two_writings_are_refused(tmp_path: Path) -> 
         path.write_text("\n".join(["t,id,x,y", *rows]))
         with pytest.raises(szlib.DataError, match="are the same number"):
             szlib.read_tracks(path)
+
+
+def test_a_quotation_mark_that_is_not_closed_loses_no_rows(tmp_path: Path) -> None:
+    """Up to the next mark, hundreds of lines would be one text."""
+    rows = [f'{k / 10},1,{k / 10},0.0,"a"' for k in range(200)]
+    rows[50] = rows[50].replace('"a"', '"a')
+    path = tmp_path / "hall.csv"
+    path.write_text("\n".join(['t,id,x,y,"note"', *rows]) + "\n")
+    with pytest.raises(szlib.DataError, match=r"quotation mark|cannot be read"):
+        szlib.read_tracks(path)

@@ -92,6 +92,12 @@ class _Table(TrackFormat):
             return one.scan_rows(plain).collect()["c"]
 
         rows = found.scan_rows(plain).collect()
+        n_lines = _count_lines(plain) - has_header
+        if found.quote and len(rows) != n_lines:
+            raise DataError(
+                f"{path}: {n_lines:,} lines below the header are {len(rows):,} rows: a quotation mark is not "
+                "closed in its line; remove it, or the line ends within quoted texts"
+            )
         return found.with_values(rows, options, f"{path}", column)
 
     def with_values(
@@ -177,6 +183,15 @@ class _ArrowTable(_Table):
         # without metadata
         rows = pl.DataFrame(pa.table(named))
         return found.with_values(rows, options, f"{path}", column)
+
+
+def _count_lines(plain: Path) -> int:
+    """Number of lines of a text."""
+    n, last = 0, b"\n"
+    with plain.open("rb") as stream:
+        while block := stream.read(1 << 22):
+            n, last = n + block.count(b"\n"), block[-1:]
+    return n + (last != b"\n")
 
 
 TIDY = _Table("tidy", has_header=True)
