@@ -35,11 +35,8 @@ from .people import Person, Prediction, TrackedPeople, Tracker, predict
 from .settings import MPCSettings
 from .step import (
     STATUSES,
-    AdmissibleControls,
-    BarrierLimit,
     Scene,
     Step,
-    find_admissible_controls,
 )
 from .verification import (
     Report,
@@ -49,4 +46,4 @@ from .verification import (
     required_margin,
 )
 from .walls import read_walls, walls_from_grid, walls_from_map
-from .ways import Way, find_route
+from .ways import Way

@@ -43,33 +43,23 @@ follow with dv/dt = (acceleration of p along e) + L omega^2, so by up to V^2 / L
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, replace
 from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
-from operator import attrgetter
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array, check_number, check_point, check_vector
+from ..checks import Array, check_array, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .controller import Controller, StepClock
 from .mpc import MPCCBF
 from .obstacles import Obstacle, Obstacles, Path
-from .people import (
-    STANDING_SPEED,
-    People,
-    Person,
-    SpeedZone,
-    TrackedPeople,
-    Tracker,
-)
-from .settings import TOLERANCE, MPCSettings
+from .people import STANDING_SPEED, People, SpeedZone, Tracker
+from .settings import MPCSettings
 from .step import Scene, Step
-from .verification import ROUNDING, Report, find_gap, is_undecided, verify_step
+from .verification import ROUNDING, Report, verify_step
 from .ways import Heading, Point
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
@@ -161,84 +151,48 @@ class _Wheels:
         return np.array(states), np.reshape(controls, (-1, 2))
 
 
-def _of_point(name: str) -> Any:
-    """A property of a `DriveStep` that is one of its point's step."""
-    return property(attrgetter(f"point.{name}"), doc=f"`Step.{name}` of the point.")
-
-
 @dataclass(frozen=True, repr=False)
 class DriveStep:
-    """What a differential drive does next, and how far it can be relied upon.
+    """What a differential drive does next; everything else is said of the point ahead of its axle.
+
+    What a `Step` has, such as `safe`, `h` or `way`, is that of `point`: what the point claims holds of the
+    disc that it carries, as this module proves. `walls_safe` and `passively_safe` are about the disc itself.
 
     Attributes
     ----------
     control : (v, omega) to hold for the next dt, within their limits, shape (2,) [m/s, rad/s].
     predicted : (x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s].
     own : state of the robot now, (x, y, theta, v, omega).
-    scene : what the step was asked, for the disc.
-    point : the step of the point ahead of the axle. Its claims `walls_safe` and `passively_safe` are about
-        the disc.
+    point : the step of the point ahead of the axle.
     wheels : how they follow the point.
-    solve_time : wall-clock time of the whole step [s].
+    spare : by which the disc is smaller than that of the point [m].
     """
 
     control: Array
     predicted: Array
     own: Array
-    scene: Scene
     point: Step
     wheels: _Wheels
-    solve_time: float
+    spare: float
 
-    status = _of_point("status")
-    slack = _of_point("slack")
-    residual = _of_point("residual")
-    stuck = _of_point("stuck")
-    clock = _of_point("clock")
-    way = _of_point("way")
-    ways = _of_point("ways")
-    walls_safe = _of_point("walls_safe")
-    passively_safe = _of_point("passively_safe")
-
-    @property
-    def h(self) -> Array:
-        """Barriers of the disc now, as of `Step.h` [m]."""
-        return self.scene.spread(self.scene.barriers.h(*self.scene.state[:2]))
-
-    @property
-    def safe(self) -> bool:
-        """As of `Step.safe`, for the disc.
-
-        No person is unknown, the plan of the point satisfies every row without a price, and the disc has h >=
-        0 now and dt later, and overlaps no body and no wall until then, if people keep their velocity.
-        """
-        points, dt = self.predicted[:2, :2], self.scene.settings.dt
-        bows = np.full((2, 1), abs(self.control.prod()) * dt**2 / 8)
-        path = Path(points, np.array([0.0, dt]), *bows)
-        h = self.scene.barriers.h(points[:, 0], points[:, 1], path.times)
-        least = min(h.min(initial=inf), self.scene.bound_gap(path))
-        is_clear = bool(least >= -TOLERANCE)
-        return self.point.feasible and not self.point.unknown and is_clear
+    def __getattr__(self, name: str) -> Any:
+        """As of the step of the point."""
+        if name == "point" or name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.point, name)
 
     def verify(self) -> Report:
         """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
-        scene, dt = self.scene, self.scene.settings.dt
-        found = verify_step(self.point, scene, self._carry)
+        found, dt = (
+            verify_step(self.point, self._carry, self.spare),
+            self.point.scene.settings.dt,
+        )
         path = self._drive(self.own[:3], self.control, dt)
-        gap, now = find_gap(scene, path), self.h
-        after = scene.barriers.h(path[-1, 0], path[-1, 1], dt)
-        worst = min([gap, *now, *after])
-        safe = found.feasible and not scene.tracked.unknown and worst >= -TOLERANCE
-        moved = np.abs(path[[0, -1]] - self.predicted[:2, :2]).max()
-        is_right = {
-            "motion": moved <= ROUNDING * max(1.0, float(np.abs(path).max())),
-            "safe": safe == self.safe or is_undecided(scene, path, worst, self.safe),
-        }
-        faults = [
-            f"{name} of the disc is wrong" for name, ok in is_right.items() if not ok
-        ]
-        h = float(now.min(initial=inf))
-        return replace(found, faults=(*found.faults, *faults), h=h, gap=gap, safe=safe)
+        differs = np.abs(path[[0, -1]] - self.predicted[:2, :2]).max()
+        if differs <= ROUNDING * max(1.0, float(np.abs(path).max())):
+            return found
+        fault = f"motion of the disc differs by {differs:.2g}"
+        return replace(found, faults=(*found.faults, fault))
 
     def _carry(self, points: Array, times: Array) -> tuple[Array, Array]:
         """The way of the disc, whose wheels follow the point from one of `points` to the next."""
@@ -262,49 +216,23 @@ class DriveStep:
 
     def __repr__(self) -> str:
         (v, omega), safe = self.control.tolist(), "safe" if self.safe else "not safe"
-        h = min(self.h.tolist(), default=inf)
-        return f"DriveStep({self.status}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s, min h={h:.3g} m)"
+        return (
+            f"DriveStep({self.status}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s)"
+        )
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified, as `Step.explain` does for the point."""
-        faults = [
-            f"\n  WRONG: {each}" for each in self.verify().faults if "disc" in each
-        ]
+        faults = [f"\n  WRONG: {each}" for each in self.verify().faults]
         return f"{self!r}{''.join(faults)}\nThe point ahead of the axle: {self.point.explain()}"
 
 
-class _Point(MPCCBF):
-    """The controller of the point ahead of the axle; its guard looks at the disc."""
-
-    wheels: _Wheels
-    own: Array  # state of the robot at this step
-
-    def _choose_heading(
-        self, scene: Scene, goal: Point, route: ArrayLike | None
-    ) -> Heading:
-        """As of `MPCCBF`, but straight to a `goal` so close that no wall lies between, as in a turn."""
-        away = dist(scene.state[:2], goal)
-        if away < self.settings.r_robot and not scene.tracked.unknown:
-            return Heading(goal, away)
-        return super()._choose_heading(scene, goal, route)
-
-    def _carry(self, path: Path) -> Path:
-        """The way of the disc whose wheels follow the point on a `path`."""
-        lasts = np.diff(path.times)
-        centres, commands = self.wheels.follow(
-            self.own, path.points[1:], lasts.tolist()
-        )
-        bows = np.abs(commands.prod(axis=1)) * lasts**2 / 8
-        return Path(centres[:, :2], path.times, bows, bows)
-
-
-class DifferentialDrive(Controller):
+class DifferentialDrive(MPCCBF):
     """Drives a robot with two wheels to a goal, outside the social zones of people and away from walls.
 
     Parameters
     ----------
     zone, walls, obstacles, tracker : as of `MPCCBF`.
-    settings : of the robot: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
+    settings : of the robot, an attribute as well: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
         `a_max` bounds the acceleration of the point ahead of the axle.
     omega_max : limit of |omega| [rad/s]; default: that of a common indoor robot whose wheels reach 1 m/s
         (assumed).
@@ -337,9 +265,6 @@ class DifferentialDrive(Controller):
     True
     """
 
-    settings: MPCSettings
-    zone: Ellipse
-    walls: Array
     robot: Unicycle
 
     def __init__(
@@ -353,54 +278,39 @@ class DifferentialDrive(Controller):
         ahead: float | None = None,
         tracker: Tracker | None = None,
     ) -> None:
-        self.settings = s = settings or MPCSettings()
-        self.robot = Unicycle()
+        s, self.robot = settings or MPCSettings(), Unicycle()
         self.omega_max = float(check_array("omega_max", omega_max, ()))
         if not 0 < self.omega_max * s.dt < pi:
             raise SolverError(
                 f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {omega_max}"
             )
         turn = 2 * sin(self.omega_max * s.dt / 2) / s.dt
-        self.ahead = (
-            s.v_max / turn if ahead is None else float(check_array("ahead", ahead, ()))
-        )
+        self.ahead = s.v_max / turn
+        if ahead is not None:
+            self.ahead = float(check_array("ahead", ahead, ()))
         if not self.ahead > 0:
             raise SolverError(
                 f"ahead must be positive: the axle itself cannot move sideways; got {ahead}"
             )
         self.v_max = min(s.v_max, self.ahead * turn)
-        self.chord_error = (
-            self.v_max * s.dt / 2 * tan(asin(self.v_max * s.dt / 2 / self.ahead) / 2)
-        )
-        radius = s.r_robot + s.eps + self.ahead + self.chord_error
+        way = self.v_max * s.dt
+        self.chord_error = way / 2 * tan(asin(way / 2 / self.ahead) / 2)
+        self._spare = s.eps + self.ahead + self.chord_error
+        radius = s.r_robot + self._spare
+        self.goal_clearance = radius + self.ahead
+        self._wheels = _Wheels(self.ahead, self.v_max)
         grown = replace(
             s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max
         )
-        self.goal_clearance = radius + self.ahead
-        self._point = _Point(
-            zone, walls=walls, obstacles=obstacles, settings=grown, tracker=tracker
-        )
-        self._point.wheels = self._wheels = _Wheels(self.ahead, self.v_max)
-        self._point._spare = radius - s.r_robot
-        self.zone, self.obstacles = self._point.zone, self._point.obstacles
-        self._take_walls()
-        self.reset()
-
-    def set_walls(self, walls: Any) -> None:
-        """Replace the `walls`, from the next step on: see `MPCCBF.set_walls`."""
-        self._point.set_walls(walls)
-        self._take_walls()
-
-    def _take_walls(self) -> None:
-        self.walls, fixed = self._point.walls, self._point._fixed.items
-        self._fixed = Obstacles.of(fixed, self.settings)
+        given = {"walls": walls, "obstacles": obstacles, "tracker": tracker}
+        super().__init__(zone, settings=grown, **given)
+        self.settings = s
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
-        self._point.reset()
-        self._command, self._clock = list[float](), StepClock(self.settings.dt)
+        super().reset()
+        self._command, self._turns = list[float](), False
         self._seen: Scene | None = None
-        self._turns = False
         self._planned_velocity = [0.0, 0.0]
 
     def step(
@@ -412,8 +322,8 @@ class DifferentialDrive(Controller):
         ids: Iterable[Hashable] | None = None,
         stamps: ArrayLike | None = None,
         now: float | None = None,
-        state_age: float = 0.0,
         route: ArrayLike | None = None,
+        state_age: float = 0.0,
     ) -> DriveStep:
         """Decide the (v, omega) to hold for the next `dt`.
 
@@ -423,48 +333,58 @@ class DifferentialDrive(Controller):
             The plan begins at the planned velocity of the point. If the robot was stopped or pushed,
             and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega).
         goal : (x, y) of the disc's centre [m].
-        people, ids, stamps, now, state_age, route : as of `MPCCBF.step`.
+        people, ids, stamps, now, route, state_age : as of `MPCCBF.step`.
 
         Raises
         ------
         SolverError : as of `MPCCBF.step`.
         """
-        began = perf_counter()
+        more = {"ids": ids, "stamps": stamps, "now": now}
+        return super().step(
+            state, goal, people, route=route, state_age=state_age, **more
+        )
+
+    def _locate(
+        self, state: ArrayLike, goal: Point, age: float
+    ) -> tuple[list[float], Point]:
+        """State and goal of the point, from those of the axle's middle."""
         old = self._read_state(state)
-        self._clock.tick(now, stamps)
-        age = check_number("state_age", state_age)
-        own = self._clock.bring_forward(self.robot, old, age, old[3:])
-        theta, centre = float(own[2]), np.array(check_point("goal", goal))
-        start = own[:2] + self.ahead * np.array([cos(theta), sin(theta)])
-        turn = self._find_turn(own[:3].tolist(), centre)
+        self._own = self._clock.bring_forward(self.robot, old, age, old[3:])
+        x, y, theta, *speeds = self._own.tolist()
+        turn = self._find_turn([x, y, theta], np.array(goal))
         # of the axle: it turns where it stands, or drives to the goal
-        at_end = own[:2] if turn else centre
-        towards = at_end + self.ahead * np.array([cos(theta + turn), sin(theta + turn)])
-        self._point.own = own
-        point = self._point.step(
-            np.concatenate([start, self._velocity(*own[2:].tolist())]),
-            towards,
-            people,
-            ids=ids,
-            stamps=stamps,
-            now=now,
-            route=route,
-        )
-        self._seen, lasts = point.scene, np.diff(self.settings.times).tolist()
-        states, controls = self._wheels.follow(own, point.predicted[1:, :2], lasts)
+        gx, gy = (x, y) if turn else goal
+        c, s = self.ahead * cos(theta), self.ahead * sin(theta)
+        to_x, to_y = self.ahead * cos(theta + turn), self.ahead * sin(theta + turn)
+        velocity = self._find_velocity(theta, *speeds)
+        return [x + c, y + s, *velocity], (gx + to_x, gy + to_y)
+
+    def _finish(self, step: Step) -> DriveStep:
+        """The command with which the wheels follow the point."""
+        self._seen, lasts = step.scene, np.diff(self._s.times).tolist()
+        states, controls = self._wheels.follow(self._own, step.predicted[1:, :2], lasts)
         self._command = controls[0].tolist()
-        self._planned_velocity = point.predicted[1, 2:].tolist()
+        self._planned_velocity = step.predicted[1, 2:].tolist()
         self._clock.hold(controls[0])
-        scene = self._make_scene(point.scene, states[0].tolist(), centre.tolist())
         return DriveStep(
-            control=controls[0],
-            predicted=states,
-            own=own,
-            scene=scene,
-            point=point,
-            wheels=self._wheels,
-            solve_time=perf_counter() - began,
+            controls[0], states, self._own, step, self._wheels, self._spare
         )
+
+    def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
+        """As of `MPCCBF`, but straight to a goal so close that no wall lies between, as in a turn."""
+        away = dist(scene.state[:2], scene.goal)
+        if away < self._s.r_robot and not scene.tracked.unknown:
+            return Heading(scene.goal, away)
+        return super()._choose_heading(scene, route)
+
+    def _carry(self, path: Path) -> Path:
+        """The way of the disc whose wheels follow the point on a `path`."""
+        lasts = np.diff(path.times)
+        centres, commands = self._wheels.follow(
+            self._own, path.points[1:], lasts.tolist()
+        )
+        bows = np.abs(commands.prod(axis=1)) * lasts**2 / 8
+        return Path(centres[:, :2], path.times, bows, bows)
 
     def _read_state(self, state: ArrayLike) -> Array:
         """(x, y, theta, v, omega) from a `state` with or without the speeds."""
@@ -476,37 +396,6 @@ class DifferentialDrive(Controller):
             )
         own = check_array("state", state, (size,)).tolist()
         return np.array([*own[:3], *(own[3:] or self._command or (0.0, 0.0))])
-
-    def _make_scene(
-        self, seen: Scene, state: Sequence[float], goal: Sequence[float]
-    ) -> Scene:
-        """The scene of the disc, from that of the point."""
-        s = self.settings
-        return seen._replace(
-            state=tuple(state),
-            goal=(goal[0], goal[1]),
-            settings=s,
-            fixed=self._fixed,
-            zones=Obstacles.of(seen.zones.items, s),
-            near_fixed=Obstacles.of(seen.near_fixed.items, s),
-        )
-
-    def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
-        """h of the disc at a `position`: of `people`, then of everything fixed, shape (obstacles,) [m]."""
-        point = check_point("position", position)
-        tracked = TrackedPeople(tuple(people))
-        seen = self._point._make_scene((*point, 0.0, 0.0), point, tracked)
-        return self._make_scene(seen, seen.state, point).barriers.h(*point)
-
-    def check_start(
-        self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person]
-    ) -> None:
-        """Raise SolverError if the `goal` is too close to a wall, from any `state` and with any `people`."""
-        if min(self.barriers(goal), default=0.0) < 0:
-            raise SolverError(
-                f"the goal {list(check_point('goal', goal))} cannot be reached: it lies too close to a wall; "
-                f"choose one at least {self.goal_clearance:.2f} m away from all walls"
-            )
 
     def _find_turn(self, own: list[float], goal: Array) -> float:
         """Angle by which the robot turns where it stands, close to its `goal` [rad]; 0: it drives on.
@@ -527,8 +416,7 @@ class DifferentialDrive(Controller):
             for zone, person in zip(scene.zones.items, scene.people, strict=True)
             if hypot(*person.velocity) < STANDING_SPEED
         )
-        s = self._point.settings
-        h = Obstacles.of(standing, s).joined(scene.near_fixed).h(px, py)
+        h = Obstacles.of(standing, self._s).joined(scene.near_fixed).h(px, py)
         free = h.min(axis=0, initial=inf) >= _FREE
         turn = remainder(float(headings[1:][free[1:].argmax()]) - theta, 2 * pi)
         self._turns = bool(free[1:].any()) and (
@@ -536,7 +424,7 @@ class DifferentialDrive(Controller):
         )
         return max(-_TURN, min(turn, _TURN)) if self._turns else 0.0
 
-    def _velocity(self, theta: float, v: float, omega: float) -> list[float]:
+    def _find_velocity(self, theta: float, v: float, omega: float) -> list[float]:
         """Velocity of the point: as planned, unless the robot does not follow its command."""
         if self._command:
             deviation = hypot(

@@ -56,7 +56,7 @@ from ..checks import (
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .controller import Controller, StepClock, find_stopping_path
-from .obstacles import Group, Obstacle, Obstacles, Path, PredictedZone, Wall, Zone
+from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone
 from .people import (
     People,
     Person,
@@ -93,10 +93,16 @@ class Outlook(NamedTuple):
     wall_seen, body_seen : the least of these gaps at points of the way [m].
     """
 
-    wall: float
-    body: float
-    wall_seen: float
-    body_seen: float
+    wall: float = inf
+    body: float = inf
+    wall_seen: float = inf
+    body_seen: float = inf
+
+    @property
+    def is_safe(self) -> tuple[bool, bool]:
+        """Whether it touches nothing fixed, and whether it overlaps nobody besides."""
+        walls_safe = self.wall >= -TOLERANCE
+        return walls_safe, walls_safe and self.body >= -TOLERANCE
 
 
 class MPCCBF(Controller):
@@ -141,7 +147,7 @@ class MPCCBF(Controller):
     settings: MPCSettings
     zone: Ellipse
     walls: Array
-    _spare = 0.0  # what the radius in `settings` is larger than the disc [m]
+    _spare = 0.0  # by which the disc is smaller than that which is planned for [m]
 
     def __init__(
         self,
@@ -152,25 +158,14 @@ class MPCCBF(Controller):
         settings: MPCSettings | None = None,
         tracker: Tracker | None = None,
     ) -> None:
-        self.settings = settings or MPCSettings()
-        speed = self.settings.zone_speed
-        verdict: Any = getattr(zone, "verdict", "usable")
-        if callable(verdict):
-            verdict = verdict(speed)
-        if verdict != "usable":
-            warn(
-                f"the zone at {speed:g} m/s should not be relied on: {verdict.sentence}"
-            )
-        # the verdict states the same
-        with catch_warnings(action="ignore", category=DataWarning):
-            self.zone = as_ellipse(zone, speed)
+        self.settings = self._s = settings or MPCSettings()
+        self.zone = _choose_zone(zone, self._s.zone_speed)
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
         self.obstacles = tuple(obstacles)
         for each in self.obstacles:
             if not isinstance(each, Obstacle):
                 raise SolverError(f"an obstacle must be an Obstacle; got {each!r}")
-        self._planner = Planner(self.settings)
-        self._nothing = Obstacles((), self.settings.r_robot)
+        self._planner = Planner(self._s)
         self._take_walls(walls)
         self.reset()
 
@@ -179,16 +174,16 @@ class MPCCBF(Controller):
         items = [Wall(*ends) for ends in self.walls.reshape(-1, 4).tolist()]
         self._solids = find_solids(walls)
         self._items = (*items, *self.obstacles)
-        self._fixed = Obstacles.of(self._items, self.settings)
-        self._ways = WayFinder(self._fixed, self.settings)
+        self._fixed = Obstacles.of(self._items, self._s)
+        self._ways = WayFinder(self._fixed, self._s)
         self._near_from, self._near_reach = (0.0, 0.0), 0.0
         self._take_near(self._items)
 
     def _take_near(self, items: Sequence[Obstacle]) -> None:
         """Take these as what is fixed near the robot, and those among them that it can always stop before."""
-        self._near_fixed = Obstacles.of(items, self.settings)
+        self._near_fixed = Obstacles.of(items, self._s)
         walls = (each for each in items if each.is_fixed)
-        self._walls_near = Obstacles.of(walls, self.settings)
+        self._walls_near = Obstacles.of(walls, self._s)
         self._room: tuple[Point, float] = (0.0, 0.0), -inf
 
     def set_walls(self, walls: Any) -> None:
@@ -218,8 +213,8 @@ class MPCCBF(Controller):
 
     def reset(self) -> None:
         """Forget the last plan and all people, so that the next step depends on no earlier one."""
-        self._plan, self._change = np.zeros((2, self.settings.N, 2))
-        self._clock = StepClock(self.settings.dt)
+        self._plan, self._change = np.zeros((2, self._s.N, 2))
+        self._clock = StepClock(self._s.dt)
         self.tracker.reset()
         self._planner.reset()
         self._near_reach, self._room = 0.0, ((0.0, 0.0), -inf)
@@ -236,7 +231,7 @@ class MPCCBF(Controller):
         now: float | None = None,
         route: ArrayLike | None = None,
         state_age: float = 0.0,
-    ) -> Step:
+    ) -> Any:
         """Decide the acceleration for the next `dt`.
 
         The robot always gets a control, whatever people do and whatever a sensor measures. `Step.status`
@@ -274,27 +269,25 @@ class MPCCBF(Controller):
         """
         began = perf_counter()
         self._check_thread()
-        x, towards = check_vector("state", state, 4), check_point("goal", goal)
         clock = self._clock
         clock.tick(now, stamps)
-        if age := check_number("state_age", state_age):
-            x = clock.bring_forward(self.robot, np.array(x), age, np.zeros(2)).tolist()
+        age = check_number("state_age", state_age)
+        x, towards = self._locate(state, check_point("goal", goal), age)
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._make_scene(x, towards, tracked, self._find_near(*x))
-        heading = self._choose_heading(scene, towards, route)
-        way = heading.length
-        remaining = way if way < inf else dist(x[:2], towards)
+        heading = self._choose_heading(scene, route)
+        remaining = heading.length if heading.length < inf else dist(x[:2], towards)
         self._planner.budget.begin(began)
         status, plan = self._decide(scene, heading)
-        walls_safe, passively_safe, brakes = self._guard(scene, plan)
+        outlook, brakes = self._guard(scene, plan)
         if brakes:
-            inputs = plan_braking(self.settings, x[2:])
+            inputs = plan_braking(self._s, x[2:])
             status, plan = "braking", plan._replace(inputs=inputs)
         if clock.has_begun:
             self._change = plan.inputs - self._plan
         self._plan = plan.inputs
-        clock.hold(plan.inputs[0])
-        return Step(
+        walls_safe, passively_safe = outlook.is_safe
+        step = Step(
             control=plan.inputs[0].copy(),
             inputs=plan.inputs,
             status=status,
@@ -304,11 +297,27 @@ class MPCCBF(Controller):
             solve_time=perf_counter() - began,
             timed_out=plan.timed_out,
             scene=scene,
-            way_length=way,
+            way_length=heading.length,
             ways=heading.ways,
             stuck=clock.time_without_progress(remaining, towards),
             clock=clock.describe(stamps, self.tracker.memory),
         )
+        return self._finish(step)
+
+    def _locate(
+        self, state: ArrayLike, goal: Point, age: float
+    ) -> tuple[list[float], Point]:
+        """State now, from a `state` of this `age`, and `goal` of the point that is planned for."""
+        x = check_vector("state", state, 4)
+        if age:
+            at = self._clock.bring_forward(self.robot, np.array(x), age, np.zeros(2))
+            x = at.tolist()
+        return list(x), goal
+
+    def _finish(self, step: Step) -> Any:
+        """What the robot does by a `step`."""
+        self._clock.hold(step.control)
+        return step
 
     def _decide(self, scene: Scene, heading: Heading) -> tuple[Status, Plan]:
         """The plan: of least cost if one satisfies the rows, else the one that violates least by priorities.
@@ -318,7 +327,7 @@ class MPCCBF(Controller):
         A plan that violates a floor may be a poor local optimum, which leads through a wall; so it is
         compared with the one that is found from full braking.
         """
-        s, last = self.settings, self._plan[0] if self._clock.has_begun else (0.0, 0.0)
+        s, last = self._s, self._plan[0] if self._clock.has_begun else (0.0, 0.0)
         target, fixed = heading.target, scene.near_fixed
         question = Question(scene.state, target, last, scene.zones, fixed)
         guess = self._plan + self._change
@@ -345,70 +354,48 @@ class MPCCBF(Controller):
                 return "restarted", other
         return "relaxed", plan
 
-    def _guard(self, scene: Scene, plan: Plan) -> tuple[bool, bool, bool]:
-        """Whether the control is safe for walls, whether it is passively safe, and whether to brake."""
-        s, state, control = self.settings, scene.state, plan.inputs[0]
-        near = self._find_reach(scene, control)
-        if near is None:
-            return True, True, False
-        after = self._foresee(*near, find_stopping_path(state, control, s))
+    def _guard(self, scene: Scene, plan: Plan) -> tuple[Outlook, bool]:
+        """What follows the control, or full braking if the robot is to brake: see this module."""
+        s, state, control = self._s, scene.state, plan.inputs[0]
+        if self._is_clear(scene, control):
+            return Outlook(), False
+        bodies = scene.bodies
+        after = self._foresee(bodies, find_stopping_path(state, control, s))
         if after.body < -TOLERANCE:
-            path = self._follow_plan(scene, plan.inputs)
-            later = self._foresee(self._nothing, scene.bodies, path)
+            later = self._foresee(bodies, self._follow_plan(scene, plan.inputs))
             after = after._replace(body=max(after.body, later.body))
-        walls_safe, bodies_safe = after.wall >= -TOLERANCE, after.body >= -TOLERANCE
-        if (walls_safe and bodies_safe) or not s.guard:
-            return walls_safe, walls_safe and bodies_safe, False
+        walls_safe, is_safe = after.is_safe
+        if is_safe or not s.guard:
+            return after, False
         braking = plan_braking(s, state[2:])[0]
-        rest = self._foresee(*near, find_stopping_path(state, braking, s))
-        if walls_safe:
-            brakes = rest.body_seen >= min(-TOLERANCE, after.body_seen)
-        else:
-            brakes = rest.wall_seen >= min(-TOLERANCE, after.wall_seen)
-        if brakes:
-            walls_safe, bodies_safe = rest.wall >= -TOLERANCE, rest.body >= -TOLERANCE
-        return walls_safe, walls_safe and bodies_safe, brakes
+        rest = self._foresee(bodies, find_stopping_path(state, braking, s))
+        seen = attrgetter("body_seen" if walls_safe else "wall_seen")
+        brakes = seen(rest) >= min(-TOLERANCE, seen(after))
+        return (rest if brakes else after), brakes
 
-    def _find_reach(
-        self, scene: Scene, control: Array
-    ) -> tuple[Obstacles, Obstacles] | None:
-        """What the robot could touch before it rests: fixed, and bodies; None if nothing.
+    def _is_clear(self, scene: Scene, control: Array) -> bool:
+        """True if the robot can touch nothing before it rests.
 
-        A way of the length L lies within L / 2 of the middle between its ends. A person walks a segment.
+        Within a step of `control` and the braking after it, it goes no farther than `reach`.
         """
-        s, (x, y, vx, vy), (ax, ay) = self.settings, scene.state, control.tolist()
+        s, (x, y, vx, vy), (ax, ay) = self._s, scene.state, control.tolist()
         last_vx, last_vy = vx + s.dt * ax, vy + s.dt * ay
-        fastest = max(abs(last_vx), abs(last_vy))
-        stop = fastest / s.a_max / 2
-        way = hypot(vx + last_vx, vy + last_vy) * s.dt / 2
-        reach, time = (
-            way + stop * hypot(last_vx, last_vy) + _BRAKING_ERROR,
-            2 * stop + 2 * s.dt,
-        )
-        mx = x + (s.dt * (vx + last_vx) / 2 + stop * last_vx) / 2
-        my = y + (s.dt * (vy + last_vy) / 2 + stop * last_vy) / 2
-        contact, near = BODY_RADIUS + s.r_robot + reach / 2, list[int]()
-        for i, person in enumerate(scene.people):
+        stop, last = max(abs(last_vx), abs(last_vy)) / s.a_max, hypot(last_vx, last_vy)
+        reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
+        contact = BODY_RADIUS + s.r_robot + reach
+        for person in scene.people:
             (px, py), (wx, wy) = person.position, person.velocity
-            dx, dy, squared = px - mx, py - my, wx * wx + wy * wy
-            if squared:
-                t = min(time, max(0.0, -(dx * wx + dy * wy) / squared))
-                dx, dy = dx + t * wx, dy + t * wy
-            if hypot(dx, dy) < contact:
-                near.append(i)
+            if hypot(px - x, py - y) < contact + (stop + 2 * s.dt) * hypot(wx, wy):
+                return False
         at, room = self._room
         if room - dist(at, (x, y)) < reach:
             room = float(self._walls_near.gaps(x, y).min(initial=inf))
             self._room = at, room = (x, y), room
-        is_far = room - dist(at, (x, y)) >= reach
-        if is_far and not near:
-            return None
-        fixed = self._nothing if is_far else self._walls_near
-        return fixed, scene.bodies.chosen(near)
+        return room - dist(at, (x, y)) >= reach
 
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
-        s, horizon = self.settings, build_horizon(self.settings)
+        s, horizon = self._s, build_horizon(self._s)
         states = horizon.states(np.array(scene.state), inputs)
         bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
         followed = Path(states[:, :2], horizon.times, bows, bows)
@@ -420,28 +407,28 @@ class MPCCBF(Controller):
         """The way of the disc, if the point that is planned for goes along a `path`."""
         return path
 
-    def _foresee(self, fixed: Obstacles, bodies: Obstacles, path: Path) -> Outlook:
-        """What follows for these if the disc goes along a `path`, on which it comes to rest."""
+    def _foresee(self, bodies: Obstacles, path: Path) -> Outlook:
+        """What follows if the disc goes along a `path`, on which it comes to rest."""
         path = self._carry(path)
-        begin = path.points[0]
-        found = [*fixed.bound(path, are_fixed=True), *bodies.bound(path)]
-        if np.ptp(path.points, axis=0).max() <= AT_REST * self.settings.dt:
-            found[2:] = 2 * [np.zeros(0)]
+        begin, spare = path.points[0], self._spare
+        wall, wall_seen = self._walls_near.bound(path, are_fixed=True)
+        of_bodies = bodies.bound(path)
+        if np.ptp(path.points, axis=0).max() <= AT_REST * self._s.dt:
+            of_bodies = np.zeros((2, 0)), np.zeros(0)
         elif bodies.size:
             places = bodies.groups[0].numbers[:, :2]
             towards = ((places - begin) @ (path.points - begin).T).max(axis=1)
-            overlaps = bodies.gaps(*begin) + self._spare < 0.0
-            parting = np.where(towards > 0, -towards, inf) - self._spare
-            found[2:] = (np.where(overlaps, parting, each) for each in found[2:])
-        least = (float(each.min(initial=inf)) + self._spare for each in found)
-        wall, wall_seen, body, body_seen = least
-        return Outlook(wall, body, wall_seen, body_seen)
+            overlaps = bodies.gaps(*begin) + spare < 0.0
+            parting = np.where(towards > 0, -towards, inf) - spare
+            of_bodies = tuple(np.where(overlaps, parting, each) for each in of_bodies)
+        found = wall, of_bodies[0], wall_seen, of_bodies[1]
+        return Outlook(*(float(each.min(initial=inf)) + spare for each in found))
 
     def _find_near(
         self, x: float, y: float, vx: float, vy: float
     ) -> tuple[int, ...] | None:
         """Places of what can matter among everything fixed: see `Scene.near`. Looked for once a metre."""
-        s, speed = self.settings, max(self.settings.v_max, hypot(vx, vy))
+        s, speed = self._s, max(self._s.v_max, hypot(vx, vy))
         if len(self._items) <= _FEW:
             return None
         longest = max(s.step_lengths)
@@ -462,39 +449,36 @@ class MPCCBF(Controller):
         near: tuple[int, ...] | None = None,
     ) -> Scene:
         """What the step is asked, with the zone of every person; `near` as of `Scene`."""
-        s, zones, found = self.settings, self._nothing, list[Ellipse]()
-        if tracked.people:
-            placed = []
-            for person in tracked.people:
-                at, velocity, heading = person.position, person.velocity, person.heading
-                is_usual = person.zone is None and heading is not None
-                found.append(zone := self.zone if is_usual else self.zone_of(person))
-                placed.append(Zone.place(zone, at, heading or 0.0, velocity))
+        s, people = self._s, tracked.people
+        zones, found = Obstacles((), s.r_robot), [self.zone_of(each) for each in people]
+        if people:
+            placed = [
+                Zone.place(zone, each.position, each.heading or 0.0, each.velocity)
+                for zone, each in zip(found, people, strict=True)
+            ]
             numbers = np.array(placed)
-            offsets, kind = np.full(len(placed), s.r_robot + s.eps), Zone
-            if any(person.prediction for person in tracked.people):
-                knots = [list_knots(person, s) for person in tracked.people]
-                numbers, kind = np.hstack([numbers, knots]), PredictedZone
-            zones = Obstacles((Group(kind, numbers, offsets),), s.r_robot)
-        near_fixed = self._fixed if near is None else self._near_fixed
+            if any(each.prediction for each in people):
+                knots = [list_knots(each, s) for each in people]
+                numbers = np.hstack([numbers, knots])
+            offsets = np.full(len(people), s.r_robot + s.eps)
+            zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
+        fixed = self._fixed, self._fixed if near is None else self._near_fixed
+        found_zones = tuple(found)
         return Scene(
             tuple(state),
             goal,
             tracked,
-            tuple(found),
+            found_zones,
             zones,
-            self._fixed,
-            near_fixed,
+            *fixed,
             s,
             self._solids,
             near,
         )
 
-    def _choose_heading(
-        self, scene: Scene, goal: Point, route: ArrayLike | None
-    ) -> Heading:
+    def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
         """Where the plan heads; among unknown people, where full braking ends."""
-        s, (x, y, vx, vy) = self.settings, scene.state
+        s, (x, y, vx, vy), goal = self._s, scene.state, scene.goal
         at, found = (x, y), None
         if route is not None:
             corners = check_array("route", route, (..., 2))
@@ -510,7 +494,7 @@ class MPCCBF(Controller):
             return heading._replace(target=(x + vx * time / 2, y + vy * time / 2))
         if scene.people and not heading.ways:
             zones, fixed = scene.zones.groups[0].numbers.tolist(), scene.near_fixed
-            target = find_target((x, y), heading.target, zones, fixed, s)
+            target = find_target(at, heading.target, zones, fixed, s)
             heading = heading._replace(target=target)
         return heading
 
@@ -521,20 +505,24 @@ class MPCCBF(Controller):
         """
         zone = self.zone if person.zone is None else person.zone
         if not isinstance(zone, Ellipse):
-            zone = as_ellipse(zone, self.settings.zone_speed)
+            zone = as_ellipse(zone, self._s.zone_speed)
         return circle_around(zone) if person.heading is None else zone
+
+    def _ask(
+        self, name: str, at: ArrayLike, people: Sequence[Person]
+    ) -> tuple[Scene, Array]:
+        """The scene of a robot at rest at a point of this `name`, and h of the disc there."""
+        x, y = point = check_point(name, at)
+        scene = self._make_scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
+        return scene, Obstacles.of(scene.barriers.items, self.settings).h(x, y)
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h at a `position`: of the zones of `people`, then of everything fixed, shape (obstacles,) [m]."""
-        x, y = point = check_point("position", position)
-        scene = self._make_scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
-        return scene.barriers.h(x, y)
+        return self._ask("position", position, people)[1]
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
         """True if h < 0 at the `goal`, because of something fixed or of one of `people` who stands."""
-        x, y = point = check_point("goal", goal)
-        tracked = TrackedPeople(tuple(people))
-        return self._make_scene((x, y, 0.0, 0.0), point, tracked).goal_blocked
+        return self._ask("goal", goal, people)[0].goal_blocked
 
     def check_start(
         self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()
@@ -547,28 +535,38 @@ class MPCCBF(Controller):
         goal : (x, y) [m], which must be free of everything fixed and of people who stand.
         people : everybody who is present.
         """
-        x, y, vx, vy = check_vector("state", state, 4)
-        towards, limit = check_point("goal", goal), self.settings.v_max
-        scene = self._make_scene((x, y, vx, vy), towards, TrackedPeople(tuple(people)))
-        h, at_goal = scene.barriers.h(x, y), self._fixed.h(*towards)
+        *at, vx, vy = check_vector("state", state, 4)
+        scene, h = self._ask("goal", at, people)
+        blocked, at_goal = self._ask("goal", goal, people)
+        limit, speed, n = self._s.v_max, hypot(vx, vy), len(people)
+        of_fixed = at_goal[n:]
         if (h < 0).any():
             i = int(h.argmin())
             raise SolverError(
-                f"the run starts in violation: h = {h[i]:.3f} m for {scene.name(i)} at {[x, y]}; "
-                "start where h >= 0"
+                f"the run starts in violation: h = {h[i]:.3f} m for {scene.name(i)} at {at}; start where "
+                "h >= 0"
             )
-        if (at_goal < 0).any():
-            i = int(at_goal.argmin())
+        cause = "in the zone of a person who stands"
+        if (of_fixed < 0).any():
+            i = int(of_fixed.argmin())
+            cause = f"too close to {scene.name(n + i)} (h = {of_fixed[i]:.3f} m)"
+        if blocked.goal_blocked:
             raise SolverError(
-                f"the goal {list(towards)} cannot be reached: it lies too close to "
-                f"{scene.name(len(people) + i)} (h = {at_goal[i]:.3f} m); choose one where h >= 0"
+                f"the goal {list(blocked.goal)} cannot be reached: it lies {cause}; choose one where h >= 0"
             )
-        if scene.goal_blocked:
-            raise SolverError(
-                f"the goal {list(towards)} cannot be reached: it lies in the zone of a person who stands; "
-                "choose one where h >= 0"
-            )
-        if (speed := hypot(vx, vy)) > limit:
+        if speed > limit:
             raise SolverError(
                 f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s"
             )
+
+
+def _choose_zone(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
+    """The ellipse of a `zone` at a walking `speed` [m/s], with a warning if it is not usable."""
+    verdict: Any = getattr(zone, "verdict", "usable")
+    if callable(verdict):
+        verdict = verdict(speed)
+    if verdict != "usable":
+        warn(f"the zone at {speed:g} m/s should not be relied on: {verdict.sentence}")
+    # the verdict states the same
+    with catch_warnings(action="ignore", category=DataWarning):
+        return as_ellipse(zone, speed)

@@ -32,8 +32,7 @@ from .settings import MPCSettings
 
 # Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre.
 SHORTEST_WALL = 1e-3
-# Numbers of a `Zone`, and of each interval of a prediction
-ZONE_SIZE, KNOT = 9, 4
+KNOT = 4  # numbers of each interval of a prediction
 
 
 def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
@@ -297,13 +296,27 @@ class Obstacle:
         return f"{self.kind} ({', '.join(f'{number:g}' for number in self.numbers)})"
 
 
+def _drift(t: Any, knots: Any) -> list[Any]:
+    """Integrals of rates from 0 to `t`; `knots`: for each interval its end, and its rates."""
+    found, begin = [0.0] * (KNOT - 1), 0.0
+    for i in range(0, len(knots), KNOT):
+        end, *rates = knots[i : i + KNOT]
+        # time within the interval
+        inside = (abs(t - begin) - abs(t - end) + end - begin) / 2
+        found = [sum_ + rate * inside for sum_, rate in zip(found, rates, strict=True)]
+        begin = end
+    return found
+
+
 class Zone(Obstacle):
     """The social zone of a person, in the world: an ellipse that moves with the person (paper, eq. 7).
 
     Parameters
     ----------
-    numbers : the foci (xa, ya, xb, yb), the semi-major axis, the velocity (vx, vy) and the position (x, y) of
-        the person [m, m/s].
+    numbers : the foci (xa, ya, xb, yb), the semi-major axis, and of the person's `Body` the position (x, y)
+        and the velocity (vx, vy) [m, m/s]. With a `Prediction` there follow, for each interval of the horizon, its end, and
+        the rates at which the person leaves the motion at constant velocity, and at which the zone grows [s,
+        m/s, m/s, m/s].
     """
 
     kind = "person"
@@ -325,28 +338,32 @@ class Zone(Obstacle):
         (x, y), c, s = position, cos(heading), sin(heading)
         ma, na, mb, nb, a = zone.foci_and_axis
         xa, ya = x + ma * c - na * s, y + ma * s + na * c
-        return xa, ya, x + mb * c - nb * s, y + mb * s + nb * c, a, *velocity, x, y
+        return xa, ya, x + mb * c - nb * s, y + mb * s + nb * c, a, x, y, *velocity
 
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """See `Obstacle.distance`: approximate, from the sum of focal distances."""
-        xa, ya, xb, yb, a, vx, vy, *_ = numbers
-        return ellipse_formula(x - t * vx, y - t * vy, xa, ya, xb, yb, a)
+        xa, ya, xb, yb, a, _, _, vx, vy, *knots = numbers
+        dx, dy, growth = _drift(t, knots)
+        focal = ellipse_formula(x - dx - t * vx, y - dy - t * vy, xa, ya, xb, yb, a)
+        return focal - growth
 
-    @classmethod
-    def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+    @staticmethod
+    def gap(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """Distance to the person's body; parameters as of `Obstacle.distance`."""
-        *_, vx, vy, px, py = numbers
-        return Body.distance(x, y, t, px, py, vx, vy)
+        return Body.distance(x, y, t, *numbers[5:])
 
-    @classmethod
-    def speeds(cls, numbers: Array) -> Array:
+    @staticmethod
+    def speeds(numbers: Array) -> Array:
         """See `Obstacle.speeds`; `numbers` as there."""
-        return np.hypot(numbers[:, 5], numbers[:, 6])
+        return Body.speeds(numbers[:, 5:])
 
 
 class Body(Obstacle):
-    """The body of a person, a disc of `BODY_RADIUS`; its `numbers` are (x, y, vx, vy) [m, m/s]."""
+    """The body of a person, a disc of `BODY_RADIUS`.
+
+    Its `numbers` are (x, y, vx, vy) [m, m/s], and end as those of a `Zone`.
+    """
 
     kind = "body"
     priority = Priority.BODY
@@ -355,72 +372,21 @@ class Body(Obstacle):
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """See `Obstacle.distance`: Euclidean."""
-        px, py, vx, vy = numbers
-        return ((x - px - t * vx) ** 2 + (y - py - t * vy) ** 2) ** 0.5 - BODY_RADIUS
+        px, py, vx, vy, *knots = numbers
+        dx, dy, _ = _drift(t, knots)
+        squared = (x - dx - px - t * vx) ** 2 + (y - dy - py - t * vy) ** 2
+        return squared**0.5 - BODY_RADIUS
 
     def margin(self, settings: MPCSettings) -> float:
         """The gap that the robot keeps to bodies by its `settings` [m]."""
         return settings.body_gap
 
-    @classmethod
-    def speeds(cls, numbers: Array) -> Array:
-        """See `Obstacle.speeds`; `numbers` as there."""
-        return np.hypot(numbers[:, 2], numbers[:, 3])
-
-
-def _drift(t: Any, knots: Any) -> list[Any]:
-    """Integrals of rates from 0 to `t`; `knots`: for each interval its end, and its rates."""
-    found, begin = [0.0] * (KNOT - 1), 0.0
-    for i in range(0, len(knots), KNOT):
-        end, *rates = knots[i : i + KNOT]
-        # time within the interval
-        inside = (abs(t - begin) - abs(t - end) + end - begin) / 2
-        found = [sum_ + rate * inside for sum_, rate in zip(found, rates, strict=True)]
-        begin = end
-    return found
-
-
-class PredictedZone(Zone):
-    """The zone of a person with a `Prediction`.
-
-    Parameters
-    ----------
-    numbers : those of `Zone`, and for each interval of the horizon its end, the rates at which the person
-        leaves the motion at constant velocity, and at which the zone grows [s, m/s, m/s, m/s].
-    """
-
-    kind = "predicted person"
-
     @staticmethod
-    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
-        """See `Zone.distance`; parameters as of `Obstacle.distance`."""
-        dx, dy, growth = _drift(t, numbers[ZONE_SIZE:])
-        return Zone.distance(x - dx, y - dy, t, *numbers[:ZONE_SIZE]) - growth
-
-    @classmethod
-    def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
-        """Distance to the person's body; parameters as of `Obstacle.distance`."""
-        dx, dy, _ = _drift(t, numbers[ZONE_SIZE:])
-        return Zone.gap(x - dx, y - dy, t, *numbers[:ZONE_SIZE])
-
-    @classmethod
-    def speeds(cls, numbers: Array) -> Array:
+    def speeds(numbers: Array) -> Array:
         """See `Obstacle.speeds`; `numbers` as there."""
-        rates = numbers[:, ZONE_SIZE:].reshape(len(numbers), -1, KNOT)[..., 1:]
+        rates = numbers[:, 4:].reshape(len(numbers), -1, KNOT)[..., 1:]
         fastest = np.abs(rates).sum(axis=2).max(axis=1, initial=0.0)
-        return np.asarray(Zone.speeds(numbers) + fastest)
-
-
-class PredictedBody(Body):
-    """The body of a person with a `Prediction`; its `numbers` end as those of a `PredictedZone`."""
-
-    kind = "predicted body"
-
-    @staticmethod
-    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
-        """See `Body.distance`; parameters as of `Obstacle.distance`."""
-        dx, dy, _ = _drift(t, numbers[4:])
-        return Body.distance(x - dx, y - dy, t, *numbers[:4])
+        return np.asarray(np.hypot(numbers[:, 2], numbers[:, 3]) + fastest)
 
 
 class Wall(Obstacle):
@@ -588,14 +554,6 @@ class Obstacles(NamedTuple):
             groups.append(Group(kind, numbers, np.array(offsets)))
         return cls(tuple(groups), settings.r_robot)
 
-    def chosen(self, rows: Sequence[int]) -> Obstacles:
-        """Those of one kind at these `rows`."""
-        if len(rows) == self.size:
-            return self
-        (kind, numbers, offsets), r_robot = self.groups[0], self.r_robot
-        chosen = Group(kind, numbers[rows], offsets[rows])
-        return Obstacles((chosen,) if rows else (), r_robot)
-
     def joined(self, others: Obstacles) -> Obstacles:
         """These, and then the `others`."""
         return Obstacles(self.groups + others.groups, self.r_robot)
@@ -716,21 +674,22 @@ def find_bodies(
 
     At constant velocity, or `as_predicted`.
     """
-    if not zones.groups:
-        return zones
-    kind, numbers, _ = zones.groups[0]
-    bodies, own = Body, numbers[:, [7, 8, 5, 6]]
-    if as_predicted and kind is PredictedZone:
-        bodies, own = PredictedBody, np.hstack([own, numbers[:, ZONE_SIZE:]])
-    offsets = np.full(len(numbers), settings.r_robot + settings.body_gap)
-    return Obstacles((Group(bodies, own, offsets),), settings.r_robot)
+    own = [
+        numbers[:, 5 : None if as_predicted else 9] for _, numbers, _ in zones.groups
+    ]
+    gap = settings.r_robot + settings.body_gap
+    groups = (Group(Body, each, np.full(len(each), gap)) for each in own)
+    return Obstacles(tuple(groups), settings.r_robot)
 
 
-def find_places(zones: Group, times: Array) -> Array:
+def find_places(zones: Obstacles, times: Array) -> Array:
     """Where the people who have these `zones` are at these `times` from now, shape (n, k, 2) [m]."""
-    steady = zones.numbers[:, None, 7:9] + times[:, None] * zones.numbers[:, None, 5:7]
-    dx, dy, _ = _drift(times, zones.numbers.T[ZONE_SIZE:, :, None])
-    return np.asarray(steady + np.stack(np.broadcast_arrays(dx, dy), axis=-1))
+    found = [np.zeros((0, len(times), 2))]
+    for _, numbers, _ in zones.groups:
+        px, py, vx, vy, *knots = numbers.T[5:, :, None]
+        dx, dy, _ = _drift(times, knots)
+        found.append(np.stack([px + times * vx + dx, py + times * vy + dy], axis=-1))
+    return np.concatenate(found)
 
 
 def rebuild(kind: type[Obstacle], numbers: Sequence[float]) -> Obstacle:

@@ -133,74 +133,51 @@ class TimeBudget:
 
 
 class _Program:
-    """A quadratic program with a number of rows for obstacles: some of a `LinearProblem`, or all of them.
+    """A quadratic program with room for a number of rows of obstacles of a `LinearProblem`.
 
     Parameters
     ----------
     problem : whose rows these are.
-    size : number of rows for obstacles.
-    prices : of the rows, if all are in the program; None: some are chosen at each call.
+    size : number of rows of obstacles.
     """
 
-    def __init__(
-        self, problem: LinearProblem, size: int, prices: Array | None = None
-    ) -> None:
-        n, first, self._model = len(problem.gradient), problem.first, daqp.Model()
-        self._problem, self._model.settings, self._has_all = (
-            problem,
-            _DAQP,
-            prices is not None,
-        )
-        self._lower, self._upper = problem.lower, problem.upper
-        self._slopes, self._sense = problem.slopes, np.zeros(first + size, np.intc)
-        if not self._has_all:
-            self._lower, self._upper = (
-                np.zeros(first + size),
-                np.full(first + size, 1e30),
-            )
-            self._slopes = np.zeros((first - n + size, n))
-        self._prices = np.zeros(first + size)
+    def __init__(self, problem: LinearProblem, size: int) -> None:
+        n, rows, first = len(problem.gradient), problem.first + size, problem.first
+        self._problem, self._model = problem, daqp.Model()
+        self._model.settings = _DAQP
+        self._lower, self._upper = np.zeros(rows), np.full(rows, 1e30)
+        self._slopes, self._prices = np.zeros((rows - n, n)), np.zeros(rows)
         # DAQP makes room for the prices of rows that are soft at first
-        self._sense[first:] = _SOFT
-        bounds = np.ones(first + size)
-        self._model.setup(
-            np.eye(n), np.zeros(n), self._slopes, bounds, -bounds, self._sense
-        )
+        self._sense = np.repeat(np.array([0, _SOFT], np.intc), [first, size])
+        start = np.eye(n), np.zeros(n), self._slopes, np.ones(rows), -np.ones(rows)
+        self._model.setup(*start, self._sense)
         self._sense[3 * n // 2 : first] = _EQUAL
-        if prices is not None:
-            self._set_prices(prices)
 
-    def _set_prices(self, prices: Array) -> None:
-        first = self._problem.first
-        self._prices[first : first + len(prices)] = prices
-        self._prices[first + len(prices) :] = 0.0
-        self._sense[first:] = _SOFT * (self._prices[first:] > 0)
-        self._model.soft_weights(w_l=self._prices, w_u=self._prices)
-
-    def choose(self, rows: NDArray[np.intp], lower: Array, prices: Array) -> None:
-        """Take these rows of the problem, with other lower bounds and prices; without a price it is hard."""
-        problem, first, m = self._problem, self._problem.first, len(rows)
-        n = len(problem.gradient)
-        k = first - n
-        self._slopes[:k], self._slopes[k + m :] = problem.slopes[:k], 0.0
-        problem.slopes.take(k + rows, axis=0, out=self._slopes[k : k + m], mode="clip")
-        self._lower[:first], self._upper[:first] = (
-            problem.lower[:first],
-            problem.upper[:first],
-        )
-        self._lower[first : first + m], self._lower[first + m :] = lower, -1e30
-        self._set_prices(prices)
-
-    def solve(self) -> tuple[Array, Array, bool] | None:
+    def solve(
+        self, rows: NDArray[np.intp], lower: Array, prices: Array
+    ) -> tuple[Array, Array, bool] | None:
         """d, the multipliers of the rows, and whether rows with a price are violated.
 
-        None if rows without a price contradict each other.
+        Of the problem's rows it has these, with other lower bounds and prices; without a price a row is hard.
+        None if hard rows contradict each other.
         """
-        p, model = self._problem, self._model
-        rows = self._slopes, self._upper, self._lower, self._sense
-        if model.update(p.hessian, p.gradient, *rows) < 0:
+        p, first, end = (
+            self._problem,
+            self._problem.first,
+            self._problem.first + len(rows),
+        )
+        k, m = first - len(p.gradient), len(rows)
+        self._slopes[:k], self._slopes[k + m :] = p.slopes[:k], 0.0
+        p.slopes.take(k + rows, axis=0, out=self._slopes[k : k + m], mode="clip")
+        self._lower[:first], self._upper[:first] = p.lower[:first], p.upper[:first]
+        self._lower[first:end], self._lower[end:] = lower, -1e30
+        self._prices[first:end], self._prices[end:] = prices, 0.0
+        self._sense[first:] = _SOFT * (self._prices[first:] > 0)
+        self._model.soft_weights(w_l=self._prices, w_u=self._prices)
+        bounds = self._slopes, self._upper, self._lower, self._sense
+        if self._model.update(p.hessian, p.gradient, *bounds) < 0:
             return None
-        step, _, flag, info = model.solve()
+        step, _, flag, info = self._model.solve()
         is_solved = flag in (_SOLVED, _VIOLATED)
         return (step, info["lam"], flag == _VIOLATED) if is_solved else None
 
@@ -218,74 +195,64 @@ class _Prepared:
         self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
     ) -> None:
         s, self.problem = settings, LinearProblem(settings, shapes, has_floors)
-        k, times = self.problem.steps, np.array(s.times)
+        k, times, levels = self.problem.steps, np.array(s.times), self.problem.levels
         # inputs change by 2 a_max at most on each axis
         change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
         self._near = -np.minimum(change, NEAR)[k]
-        self._is_hard = s.decay_price >= HARD_PRICE
-        self.prices = np.zeros(len(k))
-        lengths, levels = np.array(s.step_lengths)[k], self.problem.levels
-        priced = levels == Priority.DECAY
-        self.prices[priced] = np.minimum(s.decay_price * lengths[priced], HARD_PRICE)
-        if s.zone_price < inf:
-            priced = levels == Priority.ZONE
-            self.prices[priced] = s.zone_price * lengths[priced]
-        self._programs, self._all = dict[int, _Program](), None
         if len(k) <= _FEW_ROWS:
-            self._all = _Program(self.problem, len(k), self.prices)
+            self._near[:] = -inf
+        self._is_hard = s.decay_price >= HARD_PRICE
+        price = {Priority.DECAY: min(s.decay_price, HARD_PRICE)}
+        if s.zone_price < inf:
+            price[Priority.ZONE] = s.zone_price
+        lengths = np.array(s.step_lengths)[k]
+        self.prices = np.array([price.get(each, 0.0) for each in levels]) * lengths
+        np.minimum(self.prices, HARD_PRICE, out=self.prices)
+        self._programs = dict[int, _Program]()
 
-    def _solve_chosen(
+    def _solve_rows(
         self, rows: NDArray[np.intp], lower: Array, prices: Array
     ) -> tuple[Array, Array, bool] | None:
         size = -(-len(rows) // _ROWS) * _ROWS
         if size not in self._programs:
             self._programs[size] = _Program(self.problem, size)
-        self._programs[size].choose(rows, lower, prices)
-        return self._programs[size].solve()
+        return self._programs[size].solve(rows, lower[rows], prices[rows])
 
     def solve(self) -> tuple[Array, bool] | None:
         """The change of least cost by the priorities, True if it is relaxed; sets the multipliers of speed.
 
         None if nothing satisfies the rows that are always there.
         """
-        problem, found = self.problem, None
-        if self._all:
-            found = self._all.solve()
-        else:
-            lower = problem.lower[problem.first :]
-            rows = np.flatnonzero(lower > self._near)
-            found = self._solve_chosen(rows, lower[rows], self.prices[rows])
+        p = self.problem
+        lower = p.lower[p.first :]
+        rows = np.flatnonzero(lower > self._near)
+        found = self._solve_rows(rows, lower, self.prices)
         is_relaxed = found is None or (found[2] and self._is_hard)
         if found is None:
-            found = self._solve_levels()
+            found = self._solve_levels(rows, lower.copy())
         if found is None:
             return None
-        on_speed = problem.multipliers
-        np.negative(found[1][problem.inputs.size :][: len(on_speed)], out=on_speed)
+        on_speed = p.multipliers
+        np.negative(found[1][p.inputs.size :][: len(on_speed)], out=on_speed)
         np.clip(on_speed, 0.0, _MOST_CURVED, out=on_speed)
         return found[0], is_relaxed
 
-    def _solve_levels(self) -> tuple[Array, Array, bool] | None:
+    def _solve_levels(
+        self, near: NDArray[np.intp], lower: Array
+    ) -> tuple[Array, Array, bool] | None:
         """Level by level: the least violation, which is fixed for the next levels."""
-        p, found = self.problem, None
-        bounds, prices, chosen = (
-            p.lower[p.first :].copy(),
-            self.prices.copy(),
-            np.zeros(0, int),
-        )
-        near = np.flatnonzero(bounds > self._near)
+        p, found, chosen, prices = self.problem, None, near[:0], self.prices.copy()
         for level in Priority:
             rows = near[p.levels[near] == level]
             if not len(rows):
                 continue
             prices[rows] = np.where(prices[rows] > 0, prices[rows], HARD_PRICE)
             chosen = np.concatenate([chosen, rows])
-            solved = self._solve_chosen(chosen, bounds[chosen], prices[chosen])
+            solved = self._solve_rows(chosen, lower, prices)
             if solved is None:
                 return found
             found, slopes = solved, p.slopes[p.first - len(p.gradient) + rows]
-            violated = np.maximum(bounds[rows] - slopes @ found[0], 0.0)
-            bounds[rows] -= violated + 1e-9
+            lower[rows] -= np.maximum(lower[rows] - slopes @ found[0], 0.0) + 1e-9
             prices[rows] = 0.0
         return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import dist, hypot, inf
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import shapely
@@ -13,21 +13,17 @@ import shapely
 from ..checks import Array
 from ..zones.ellipses import Ellipse
 from .obstacles import Obstacle, Obstacles, Path, Priority, find_bodies
-from .people import Person, TrackedPeople
+from .people import STANDING_SPEED, Person, TrackedPeople
 from .problem import build_horizon, list_conditions
 from .settings import TOLERANCE, MPCSettings
 from .verification import Report, Row, verify_step
-from .ways import Way, blocks
+from .ways import Way
 
 Status = Literal["optimal", "relaxed", "restarted", "braking"]
 STATUSES: tuple[Status, ...] = get_args(Status)
 """How a control was found; see `Step.status`."""
-# Of the curves of limits: their reach, in half-widths of the box of accelerations, so that they cross it; the
-# number of their points, between which they are straight to 1e-3 m/s2; and the halvings that find them.
-_REACH, _POINTS, _BISECTIONS = 3, 49, 20
-HOLDS = (
-    2e-3  # a barrier condition whose residual is smaller than this holds the robot [m]
-)
+# A barrier condition whose residual is smaller than this holds the robot [m].
+HOLDS = 2e-3
 _MEANING: dict[Status, str] = {
     "optimal": "optimal, every row without a price holds",
     "relaxed": "relaxed by priorities: walls, bodies, zones, decay",
@@ -83,9 +79,9 @@ class Scene(NamedTuple):
     @property
     def goal_blocked(self) -> bool:
         """True if h < 0 at the goal, because of something fixed or of a person who stands there."""
-        zones = (zone.numbers for zone in self.zones.items)
-        stands = any(blocks(zone, self.goal, self.settings) for zone in zones)
-        return stands or bool((self.fixed.h(*self.goal) < 0).any())
+        h = self.zones.joined(self.fixed).h(*self.goal)
+        stand = [hypot(*each.velocity) < STANDING_SPEED for each in self.people]
+        return bool((h < 0)[[*stand, *[True] * self.fixed.size]].any())
 
     @property
     def is_in_solid(self) -> bool:
@@ -111,14 +107,14 @@ class Scene(NamedTuple):
 
     def name(self, i: int) -> str:
         """Name of the obstacle `i` of `Step.obstacles`, such as "wall 0 (0, 0, 5, 0)"."""
-        if i < len(self.people):
+        number = i - len(self.people)
+        if number < 0:
             known = self.people[i].id
             return f"person {i}" + ("" if known is None else f" (id {known!r})")
-        number = i - len(self.people)
-        kinds = [each.kind for each in self.fixed.items]
-        same = kinds[:number].count(kinds[number])
-        numbers = ", ".join(f"{each:g}" for each in self.fixed.items[number].numbers)
-        return f"{kinds[number]} {same} ({numbers})"
+        items = self.fixed.items
+        kind, own = items[number].kind, items[number].numbers
+        same = sum(each.kind == kind for each in items[:number])
+        return f"{kind} {same} ({', '.join(f'{each:g}' for each in own)})"
 
     def bound_gap(self, path: Path) -> float:
         """Lower bound of the gaps to bodies and everything fixed, and of h + eps of people, on a `path`.
@@ -226,26 +222,29 @@ class Step:
         keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h], float)
         return self.scene.spread(h[:, 1 : s.N_h + 1] - keep * h[:, : s.N_h])
 
+    def _find_violations(self, has_floors: bool) -> dict[Priority, float]:
+        """Largest violation of the conditions of each `Priority`, with or without floors [m]."""
+        scene, s = self.scene, self.scene.settings
+        x, y, *_ = self.predicted.T
+        bodies = find_bodies(scene.zones, s, as_predicted=True)
+        obstacles = scene.barriers.joined(bodies) if has_floors else scene.barriers
+        h, worst, i = (
+            obstacles.h(x, y, np.array(s.times)),
+            dict.fromkeys(Priority, 0.0),
+            0,
+        )
+        for kind, _, offsets in obstacles.groups:
+            own, i = h[i : i + len(offsets)], i + len(offsets)
+            for level, keep in list_conditions(s, kind, has_floors):
+                n = len(keep)
+                left = own[:, 1 : n + 1] - np.array(keep) * own[:, :n]
+                worst[level] = max(worst[level], -float(left.min()))
+        return worst
+
     @cached_property
     def violations(self) -> dict[Priority, float]:
         """Largest violation by the plan of the conditions of each `Priority` [m]: see `control.planner`."""
         return self._find_violations(has_floors=True)
-
-    def _find_violations(self, has_floors: bool) -> dict[Priority, float]:
-        """As `violations`, with or without floors."""
-        scene, s = self.scene, self.scene.settings
-        worst, found = dict.fromkeys(Priority, 0.0), [(scene.barriers, self._h_of_plan)]
-        if has_floors:
-            x, y, *_ = self.predicted.T
-            bodies = find_bodies(scene.zones, s, as_predicted=True)
-            found.append((bodies, bodies.h(x, y, np.array(s.times))))
-        for obstacles, h in found:
-            kinds = (kind for kind, *_, offsets in obstacles.groups for _ in offsets)
-            for kind, own in zip(kinds, h, strict=True):
-                for level, keep in list_conditions(s, kind, has_floors):
-                    left = own[1 : len(keep) + 1] - np.array(keep) * own[: len(keep)]
-                    worst[level] = max(worst[level], -float(left.min()))
-        return worst
 
     @cached_property
     def slack(self) -> float:
@@ -253,16 +252,11 @@ class Step:
 
         Also of rest at the end, if the plan must end there [m/s].
         """
-        s, velocity = self.scene.settings, self.predicted[:, 2:]
+        s, velocity = self.scene.settings, self.predicted[1:, 2:]
+        prices = {Priority.ZONE: s.zone_price, Priority.DECAY: s.decay_price}
         worst = self._find_violations(has_floors=s.decay_price < inf)
-        for level, price in (
-            (Priority.ZONE, s.zone_price),
-            (Priority.DECAY, s.decay_price),
-        ):
-            if price < inf:
-                del worst[level]
-        found = [*worst.values()]
-        found.append(float((velocity[1:] ** 2).sum(axis=1).max()) - s.v_max**2)
+        found = [worst[each] for each in Priority if prices.get(each, inf) == inf]
+        found.append(float((velocity**2).sum(axis=1).max()) - s.v_max**2)
         if s.terminal == "rest":
             found.append(float(np.abs(velocity[-1]).max()))
         return max(0.0, *found)
@@ -367,45 +361,38 @@ class Step:
 
     def _list_notes(self) -> list[str]:
         """What else has to be known, and what would help."""
-        scene, s, notes = self.scene, self.scene.settings, list[str]()
-        if s.decay_price < inf and self.violations[Priority.DECAY] > TOLERANCE:
-            worst = scene.name(int(self.residual.min(axis=1).argmin()))
-            notes.append(
-                f"h of {worst} falls faster than gamma = {s.gamma:g}, at its price; what helps: "
-                f"a decay_price above {s.decay_price:g}"
-            )
-        if s.zone_price < inf and self.violations[Priority.ZONE] > TOLERANCE:
-            notes.append(
-                f"it enters a zone by {self.violations[Priority.ZONE]:.2g} m, at its price; what helps: "
-                f"a zone_price above {s.zone_price:g}"
-            )
-        if not self.walls_safe:
-            notes.append("it cannot stop before a wall; what helps: start slower")
-        if not self.passively_safe:
-            notes.append(
-                "somebody may walk into it before it rests; what helps: a larger body_gap or a lower v_max"
-            )
-        if self.timed_out:
-            notes.append(
-                f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one"
-            )
-        if self.scene.goal_blocked:
-            notes.append(
-                f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
-                "helps: another goal"
-            )
-        if self.way_length == inf:
-            notes.append(
-                "walls leave no way to the goal, so the robot goes to the nearest point that it can "
-                "reach; what helps: another goal"
-            )
-        if self.rejected:
-            notes.append(
-                f"{self.rejected} measurements of people were rejected; {self.unknown} are unknown"
-            )
-        if self.stuck:
-            notes.append(f"no progress for {self.stuck:.1f} s, {self._explain_stuck()}")
-        return [f"  {note}" for note in [*notes, self.clock] if note]
+        scene, s, worst = self.scene, self.scene.settings, self.violations
+        late = min(s.time_limit, s.deadline)
+        slowest = (
+            scene.name(int(self.residual.min(axis=1).argmin())) if len(self.h) else ""
+        )
+        is_priced = {
+            Priority.DECAY: s.decay_price < inf,
+            Priority.ZONE: s.zone_price < inf,
+        }
+        bought = {
+            each for each in is_priced if is_priced[each] and worst[each] > TOLERANCE
+        }
+        notes = {
+            f"h of {slowest} falls faster than gamma = {s.gamma:g}, at its price; what helps: a "
+            f"decay_price above {s.decay_price:g}": Priority.DECAY in bought,
+            f"it enters a zone by {worst[Priority.ZONE]:.2g} m, at its price; what helps: a zone_price above "
+            f"{s.zone_price:g}": Priority.ZONE in bought,
+            "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
+            "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
+            "v_max": not self.passively_safe,
+            f"time was up after {late} s; what helps: a larger one": self.timed_out,
+            f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what helps: "
+            "another goal": scene.goal_blocked,
+            "walls leave no way to the goal, so the robot goes to the nearest point that it can reach; what "
+            "helps: another goal": self.way_length == inf,
+            f"{self.rejected} measurements of people were rejected; {self.unknown} are "
+            "unknown": self.rejected > 0,
+            f"no progress for {self.stuck:.1f} s, {self._explain_stuck()}": self.stuck
+            > 0,
+            self.clock: bool(self.clock),
+        }
+        return [f"  {note}" for note, holds in notes.items() if holds]
 
     def _explain_other(self, way: Way) -> str:
         """Why another way is not taken."""
@@ -432,109 +419,3 @@ class Step:
             return f"more than N = {s.N} steps, an a_max above {s.a_max:g}, or a v_max below {s.v_max:g}"
         longer = f"an N_h above {s.N_h}" if s.N_h < s.N else f"an N above {s.N}"
         return f"brake earlier: a gamma below {s.gamma:g}, {longer}, or a v_max below {s.v_max:g}"
-
-
-class BarrierLimit(NamedTuple):
-    """The edge of what one barrier row allows.
-
-    Attributes
-    ----------
-    row : place of the obstacle in `Step.obstacles`.
-    k : the row links steps k and k + 1 of the plan.
-    curve : points with the allowed side on the left, shape (n, 2) [m/s2].
-    """
-
-    row: int
-    k: int
-    curve: Array
-
-
-class AdmissibleControls(NamedTuple):
-    """All first accelerations that obey every row, with the rest of the plan unchanged [m/s2, world frame].
-
-    Attributes
-    ----------
-    polygon : a Shapely polygon, which may be empty or have several parts.
-    limits : the barrier rows that forbid something that the bounds and the speed limit allow.
-    """
-
-    polygon: Any
-    limits: tuple[BarrierLimit, ...]
-
-
-def find_admissible_controls(step: Step) -> AdmissibleControls:
-    """Find the accelerations that a step could have chosen: bounds, speed limit, and every barrier row.
-
-    Prices are ignored: every decay counts as hard. A terminal condition is ignored, because with the rest of
-    the plan unchanged it allows only the chosen acceleration. If the plan is not feasible, the polygon is
-    empty or does not contain the control.
-
-    Parameters
-    ----------
-    step : of an `MPCCBF`.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> import szlib
-    >>> from szlib.control import find_admissible_controls
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> step = controller.step((-2.5, 0.0, 0.2, 0.0), (4.0, 0.0), [szlib.Person((0.0, 0.0))])
-    >>> found = find_admissible_controls(step)
-    >>> found.polygon.distance(shapely.Point(step.control)) < 1e-3
-    True
-    """
-    s, u0, x = step.scene.settings, step.control, step.predicted
-    free = shapely.box(-s.a_max, -s.a_max, s.a_max, s.a_max)
-    for velocity in x[1:, 2:]:
-        disc = shapely.Point(u0 - velocity / s.dt).buffer(s.v_max / s.dt, quad_segs=256)
-        free = free.intersection(disc)
-    polygon, limits = free, []
-    kinds = (g.kind for g in step.scene.barriers.groups for _ in g.offsets)
-    for i, (row, kind) in enumerate(zip(step.scene.rows, kinds, strict=True)):
-        for condition in list_conditions(s, kind, has_floors=s.decay_price < inf):
-            for k, (curve, inward) in enumerate(_find_edges(step, i, condition.keep)):
-                outer = curve[::-1] + 2 * _REACH * s.a_max * inward
-                allowed = shapely.Polygon(np.vstack([curve, outer]))
-                if not allowed.covers(free):
-                    limits.append(BarrierLimit(row, k, curve))
-                    polygon = polygon.intersection(allowed)
-    return AdmissibleControls(polygon, tuple(limits))
-
-
-def _find_edges(
-    step: Step, i: int, keep: tuple[float, ...]
-) -> list[tuple[Array, Array]]:
-    """The edge of each row of the near obstacle `i`, and the direction to its allowed side."""
-    s, u0, n = step.scene.settings, step.control, len(keep)
-    reach = _REACH * s.a_max
-    nudges = 1e-3 * s.a_max * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
-    at = np.broadcast_to(u0 + nudges, (n, 4, 2))
-    right, left, up, down = np.moveaxis(_find_residuals(step, i, keep, at), -1, 0)
-    inward = np.stack([right - left, up - down], axis=-1)
-    steepest = np.hypot(inward[:, :1], inward[:, 1:])
-    inward = np.where(
-        steepest > 0, inward / np.where(steepest > 0, steepest, 1.0), (1.0, 0.0)
-    )
-    across = np.stack([inward[:, 1], -inward[:, 0]], axis=-1)
-    along = u0 + np.linspace(-reach, reach, _POINTS)[:, None] * across[:, None, :]
-    low, high = np.full((n, _POINTS), -reach), np.full((n, _POINTS), reach)
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        edges = along + middle[..., None] * inward[:, None, :]
-        obeys = _find_residuals(step, i, keep, edges) >= 0
-        low, high = np.where(obeys, low, middle), np.where(obeys, middle, high)
-    edges = along + high[..., None] * inward[:, None, :]
-    return list(zip(edges, inward, strict=True))
-
-
-def _find_residuals(step: Step, i: int, keep: tuple[float, ...], first: Array) -> Array:
-    """Residuals of n rows of the near obstacle `i` for other first controls, (n, m, 2) to (n, m)."""
-    s, n = step.scene.settings, len(keep)
-    only = Obstacles.of(step.scene.barriers.items[i : i + 1], s)
-    times = np.array(s.times[: n + 1])[:, None]
-    moved, found = s.dt * np.maximum(times - s.dt / 2, 0)[..., None], list[Array]()
-    for rows in (slice(n), slice(1, n + 1)):
-        at = step.predicted[rows, None, :2] + moved[rows] * (first - step.control)
-        found.append(only.h(at[..., 0], at[..., 1], times[rows])[0])
-    return np.asarray(found[1] - np.array(keep)[:, None] * found[0])

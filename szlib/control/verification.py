@@ -30,8 +30,7 @@ formula.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -253,8 +252,6 @@ class Report:
     Attributes
     ----------
     faults : each claim that is wrong, as a sentence; empty if all claims hold.
-    differences : between the step's numbers and ours: of "motion" [m, m/s], "h" and "residual" [m], "slack".
-    out_of_bounds : largest |ax| or |ay| of the plan beyond `a_max`, 0 if none [m/s2].
     worst : the row without a price that has the smallest value.
     slack : by how much `worst` is violated, 0 if it is not.
     h : smallest barrier in the state itself and after the control [m]; inf without any.
@@ -264,8 +261,6 @@ class Report:
     """
 
     faults: tuple[str, ...]
-    differences: dict[str, float]
-    out_of_bounds: float
     worst: Row
     slack: float
     h: float
@@ -279,199 +274,172 @@ class Report:
         return not self.faults
 
 
-def verify_step(step: Any, carried: Any = None, carry: Carry | None = None) -> Report:
+def verify_step(step: Any, carry: Carry | None = None, spare: float = 0.0) -> Report:
     """Check the plan of a `step` (a `Step`), and its claims.
 
     Parameters
     ----------
     step : the step.
-    carried, carry : scene and way of the disc, if the step is that of another point: see `_check_promises`.
+    carry, spare : way of the disc, and by how much it is smaller [m], if the step is that of another point:
+        see `_check_guard`.
     """
     scene, s, x = step.scene, step.scene.settings, np.asarray(step.predicted, float)
-    lengths = np.array(s.grid or [1] * s.N)
-    dt, times = s.dt * lengths[:, None], s.dt * np.r_[0, np.cumsum(lengths)]
-    u = np.diff(x[:, 2:], axis=0) / dt
-    ahead = x[:-1, :2] + dt * x[:-1, 2:] + dt**2 / 2 * u
-    moved = np.vstack([scene.state, np.c_[ahead, x[1:, 2:]]])
-    h = _measure_all(scene, x[:, :2], times, is_barrier=True)
-    keep = (1 - s.gamma) ** lengths[: s.N_h]
-    residual = h[:, 1 : s.N_h + 1] - keep * h[:, : s.N_h]
-    t = np.linspace(0.0, s.dt, _SAMPLES)[:, None]
-    path = x[0, :2] + t * x[0, 2:] + t**2 / 2 * step.control
-    gap, min_h = find_gap(scene, path), float(h[:, :2].min(initial=np.inf))
+    times = s.dt * np.cumsum([0, *(s.grid or [1] * s.N)])
+    moved = _follow(np.array(scene.state), step.inputs, np.diff(times))
+    h = _measure(scene, x[:, :2], times, is_barrier=True)
+    residual = h[:, 1:] - (1 - s.gamma) ** (np.diff(times) / s.dt) * h[:, :-1]
     worst = min(_list_rows(scene, x, h, residual), key=lambda row: row.value)
     slack = max(0.0, -worst.value)
     feasible = slack <= TOLERANCE
-    safe = feasible and not scene.tracked.unknown and min(min_h, gap) >= -TOLERANCE
-    beyond = max(0.0, float(np.abs([*u, step.control]).max()) - s.a_max)
-    size, scale = _scale(x), _scale(h)
-    differences = {
-        "motion": float(
-            max(np.abs(moved - x).max(), s.dt * np.abs(u[0] - step.control).max())
-        ),
-        "h": _differ(h[:, 0], step.h[scene.rows]),
-        "residual": _differ(residual, step.residual[scene.rows]),
-        "slack": abs(slack - step.slack),
+    path = _sample(x[0], step.control, s.dt)
+    gap, least = _find_gap(scene, path), float(h[:, :2].min(initial=np.inf))
+    lowest = min(gap, least)
+    safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
+    compared = {
+        "motion": (moved, x),
+        "control": (step.control, step.inputs[0]),
+        "h": (h[:, 0], step.h[scene.rows]),
+        "residual": (residual[:, : s.N_h], step.residual[scene.rows]),
+        "slack": (slack, step.slack),
     }
+    tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
     faults = [
-        f"{name} differs by {value:.2g}"
-        for name, value in differences.items()
-        if not value <= ROUNDING * (size if name == "motion" else scale)
+        f"{name} differs by {np.abs(found - claimed).max():.2g}"
+        for name, (found, claimed) in compared.items()
+        if not np.abs(found - claimed).max(initial=0.0) <= tolerance
     ]
-    if not beyond <= ROUNDING / s.dt * size:
+    beyond = np.abs(step.inputs).max() - s.a_max
+    if not beyond <= tolerance / s.dt:
         faults.append(f"an acceleration is {beyond:.2g} m/s2 beyond its bound")
-    undecided = abs(slack - TOLERANCE) <= ROUNDING * scale
-    undecided |= is_undecided(scene, path, min(min_h, gap), step.safe)
-    claims = step.feasible, step.safe
-    if not undecided and (feasible, safe) != claims:
+    undecided = min(abs(slack - TOLERANCE), abs(lowest + TOLERANCE)) <= tolerance
+    # the bound of a step may be loose where somebody or the robot is fast
+    fastest = max([float(np.hypot(*each.velocity)) for each in scene.people], default=0)
+    reach = s.dt * fastest + 2 * np.abs(path - path[0]).sum(axis=1).max()
+    undecided |= not step.safe and lowest <= reach
+    if not undecided and (feasible, safe) != (step.feasible, step.safe):
         faults.append(
-            "the step says feasible {}, safe {}; found {}, {}".format(
-                *claims, feasible, safe
-            )
+            f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
         )
-    faults += _check_promises(step, carried or scene, carry)
-    return Report(
-        tuple(faults), differences, beyond, worst, slack, min_h, gap, feasible, safe
-    )
+    faults += _check_guard(step, x, np.diff(times), carry, spare)
+    return Report(tuple(faults), worst, slack, least, gap, feasible, safe)
 
 
-def _check_promises(step: Any, scene: Any, carry: Carry | None = None) -> Iterator[str]:
+def _follow(state: Array, inputs: Array, lasts: Array) -> Array:
+    """States of a double integrator that holds each input, shape (k, 2), for its time (paper, eq. 8)."""
+    found = [state]
+    for u, dt in zip(inputs, lasts, strict=True):
+        (x, y, vx, vy), half = found[-1], dt / 2 * u
+        p = np.array([x, y]) + dt * (np.array([vx, vy]) + half)
+        found.append(np.r_[p, (vx, vy) + 2 * half])
+    return np.array(found)
+
+
+def _sample(state: Array, control: Array, dt: float) -> Array:
+    """Points of a way on which a control is held for `dt`, shape (`_SAMPLES`, 2) [m]."""
+    t = np.linspace(0.0, dt, _SAMPLES)[:, None]
+    return np.asarray(state[:2] + t * state[2:] + t**2 / 2 * control)
+
+
+def _check_guard(
+    step: Any, x: Array, lasts: Array, carry: Carry | None, spare: float
+) -> Iterator[str]:
     """What is wrong with `walls_safe` and `passively_safe` of a `step`, by many points of both ways.
 
     Parameters
     ----------
-    step : a `Step`.
-    scene : that of the disc, to which the claims belong.
+    step : a `Step`, with its plan's states `x`, and the times `lasts` between them.
     carry : the way of the disc from that of the point which is planned for; None: it is the same.
+    spare : by which the disc is smaller than that of the scene [m].
     """
-    s, x = scene.settings, np.asarray(step.predicted, float)
-    lengths = s.dt * np.array(s.grid or [1] * s.N)
-    plan = list(zip(np.diff(x[:, 2:], axis=0) / lengths[:, None], lengths, strict=True))
+    scene, s = step.scene, step.scene.settings
     is_fixed = np.array([each.is_fixed for each in scene.barriers.items], bool)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
     is_clear = list[bool]()
-    for pieces in ([(step.control, s.dt)], plan):
-        points, times = _sample(x[0], pieces, s)
+    for n in (1, s.N):
+        inputs = np.vstack([step.control, step.inputs[1:]])[:n]
+        points, times = _sample_until_rest(x[0], inputs, lasts[:n], s)
         if carry:
             points, times = carry(points[:: _SAMPLES - 1], times[:: _SAMPLES - 1])
-        gaps = _measure_all(scene, points, times, is_barrier=False, as_predicted=False)
-        of_fixed, of_bodies = gaps[is_fixed], gaps[~is_fixed]
-        if not is_clear and step.walls_safe and (of_fixed < -TOLERANCE).any():
+        gaps = spare + _measure(scene, points, times, as_predicted=False)
+        of_bodies = gaps[~is_fixed]
+        if n == 1 and step.walls_safe and (gaps[is_fixed] < -TOLERANCE).any():
             yield "the step says that it can stop before every wall; it cannot"
-        free = of_bodies[of_bodies[:, 0] >= -TOLERANCE]
-        rests = np.ptp(points, axis=0).max() <= AT_REST * s.dt
-        overlapped = of_bodies[:, 0] < -TOLERANCE
+        overlaps = of_bodies[:, 0] < -TOLERANCE
         ends = points[:: _SAMPLES - 1] - points[0]
         nearer = ((places - points[0]) @ ends.T > TOLERANCE).any(axis=1)
-        is_clear.append(
-            bool(rests or ((free >= -TOLERANCE).all() and not nearer[overlapped].any()))
-        )
+        is_hit = np.where(overlaps, nearer, (of_bodies < -TOLERANCE).any(axis=1))
+        rests = np.ptp(points, axis=0).max() <= AT_REST * s.dt
+        is_clear.append(bool(rests or not is_hit.any()))
     if step.passively_safe and not any(is_clear):
         yield "the step says that it rests before somebody walks into it; it does not"
 
 
-def _sample(
-    state: Array, pieces: Iterable[tuple[Array, float]], s: Any
+def _sample_until_rest(
+    state: Array, inputs: Array, lasts: Array, s: Any
 ) -> tuple[Array, Array]:
-    """Points of a way, and their times: each control is held for its time, then the robot brakes."""
-    points, times, todo = [state[None, :2]], [np.zeros(1)], deque(pieces)
-    p, v = state[:2], state[2:]
-    while todo or np.abs(v).max() > 1e-9:
+    """Points of a way, and their times: each input is held for its time, then the robot brakes."""
+    points, times = [state[None, :2]], [np.zeros(1)]
+    todo = list(zip(inputs, lasts, strict=True))
+    while todo or np.abs(state[2:]).max() > 1e-9:
         if not todo:
-            stop = np.abs(v).max() / s.a_max
-            lasts = s.dt * max(1.0, np.ceil(stop / s.dt / _SAMPLES))
-            todo.append((-v / max(lasts, stop), lasts))
-        control, lasts = todo.popleft()
-        shares = lasts * np.linspace(0.0, 1.0, _SAMPLES)[1:, None]
-        points.append(p + shares * v + shares**2 / 2 * control)
-        times.append(times[-1][-1] + shares[:, 0])
-        p, v = points[-1][-1], v + lasts * control
+            stop = np.abs(state[2:]).max() / s.a_max
+            piece = s.dt * max(1.0, np.ceil(stop / s.dt / _SAMPLES))
+            todo.append((-state[2:] / max(piece, stop), piece))
+        control, dt = todo.pop(0)
+        points.append(_sample(state, control, dt)[1:])
+        times.append(times[-1][-1] + np.linspace(0.0, dt, _SAMPLES)[1:])
+        state = np.r_[points[-1][-1], state[2:] + dt * control]
     return np.concatenate(points), np.concatenate(times)
 
 
-def _scale(numbers: Array) -> float:
-    return max(1.0, float(np.abs(numbers).max(initial=0.0)))
-
-
-def _differ(found: Array, claimed: Array) -> float:
-    return float(np.abs(found - claimed).max(initial=0.0))
-
-
-def is_undecided(scene: Any, path: Array, worst: float, claimed: bool) -> bool:
-    """True if rounding decides whether the step is safe, or a loose bound may say (`claimed`) unsafe.
-
-    Parameters
-    ----------
-    scene, path : what the step was asked, and where the robot goes.
-    worst : the smallest number found [m].
-    claimed : what the step says.
-    """
-    speed = max(
-        [float(np.hypot(*person.velocity)) for person in scene.people], default=0.0
-    )
-    reach = scene.settings.dt * speed + 2 * np.abs(path - path[0]).sum(axis=1).max()
-    is_rounded = abs(worst + TOLERANCE) <= ROUNDING * _scale(path)
-    return bool(is_rounded or (not claimed and worst <= reach))
-
-
-def find_gap(scene: Any, path: Array) -> float:
-    """Smallest gap on the `path` of a step, shape (n, 2), as of `Report.gap`, in this `scene` [m].
-
-    -inf inside of a solid wall.
-    """
-    solids = scene.solids
+def _find_gap(scene: Any, path: Array) -> float:
+    """Smallest gap on the `path` of a step, shape (n, 2), as of `Report.gap` [m]; -inf in a solid wall."""
+    solids, eps = scene.solids, scene.settings.eps
     if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
         return -np.inf
     times = np.linspace(0.0, scene.settings.dt, len(path))
-    gaps = _measure_all(scene, path, times, is_barrier=False)
-    h = _measure_all(scene, path, times, is_barrier=True)[: len(scene.people)]
-    least = min(gaps.min(initial=np.inf), (h + scene.settings.eps).min(initial=np.inf))
-    return float(least)
+    h = _measure(scene, path, times, is_barrier=True)[: len(scene.people)]
+    gaps = _measure(scene, path, times)
+    return float(min(gaps.min(initial=np.inf), (h + eps).min(initial=np.inf)))
 
 
-def _list_rows(scene: Any, x: Array, h: Array, residual: Array) -> list[Row]:
-    """Every row without a price."""
-    s, items = scene.settings, scene.barriers.items
-    lengths = np.array(s.grid or [1] * s.N)
-    hard = dict[str, tuple[str, Array]]()
-    names = [scene.name(i) for i in scene.rows]
-    for i, each in enumerate(items):
+def _list_rows(scene: Any, x: Array, h: Array, residual: Array) -> Iterator[Row]:
+    """Every row without a price, at the states `x` of a plan."""
+    s, lengths = scene.settings, np.array(scene.settings.grid or [1] * scene.settings.N)
+    has_floors, found = s.decay_price < np.inf, list[tuple[str, str, Array]]()
+    stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
+    for i, (row, each) in enumerate(zip(scene.rows, scene.barriers.items, strict=True)):
+        name = scene.name(row)
         if not each.has_barrier:
-            hard[names[i]] = each.kind, h[i, 1:]
-        elif s.decay_price == np.inf:
-            hard[names[i]] = each.kind, residual[i]
+            found.append((each.kind, name, h[i, 1:]))
+        elif not has_floors:
+            found.append((each.kind, name, residual[i, : s.N_h]))
         elif each.is_fixed:
-            gamma = min(1.0, s.a_max * s.dt / s.v_max)
-            hard[names[i]] = each.kind, h[i, 1:] - (1 - gamma) ** lengths * h[i, :-1]
+            found.append((each.kind, name, h[i, 1:] - stop**lengths * h[i, :-1]))
         elif s.zone_price == np.inf:
-            hard[names[i]] = each.kind, h[i, 1 : s.N_h + 1]
-    if s.decay_price < np.inf:
-        for i, person in enumerate(scene.people):
-            places, _ = _find_places(person, np.array(s.times), s, True)
-            away = np.hypot(*(x[:, :2] - places).T)[1:]
+            found.append((each.kind, name, h[i, 1 : s.N_h + 1]))
+        if has_floors and isinstance(each, Zone):
+            times = s.dt * np.cumsum([0, *lengths])
+            places, _ = _find_places(scene.people[i], times, s, True)
+            away = np.hypot(*(x[1:, :2] - places[1:]).T)
             gap = away - BODY_RADIUS - s.r_robot - s.body_gap
-            hard[f"the body of {names[i]}"] = "body", gap
-    rows = [
-        Row(kind, f"the condition of {name} from k = {k} to {k + 1}", float(value))
-        for name, (kind, values) in hard.items()
-        for k, value in enumerate(values)
-    ]
-    speed = s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)
-    rows += [
-        Row("speed", f"the speed limit at k = {k + 1}", float(value))
-        for k, value in enumerate(speed)
-    ]
+            found.append(("body", f"the body of {name}", gap))
+    for kind, name, values in found:
+        for k, value in enumerate(values.tolist()):
+            where = f"the condition of {name} from k = {k} to {k + 1}"
+            yield Row(kind, where, value)
+    for k, value in enumerate((s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)).tolist()):
+        yield Row("speed", f"the speed limit at k = {k + 1}", value)
     if s.terminal == "rest":
-        rows.append(Row("end", "rest at the end", -float(np.abs(x[-1, 2:]).max())))
-    return rows
+        yield Row("end", "rest at the end", -float(np.abs(x[-1, 2:]).max()))
 
 
-def _measure_all(
+def _measure(
     scene: Any,
     points: Array,
     times: Array,
     *,
-    is_barrier: bool,
+    is_barrier: bool = False,
     as_predicted: bool = True,
 ) -> Array:
     """h, or Euclidean gaps of the disc, of each obstacle at points and times from now, shape (n, k) [m].
@@ -481,22 +449,19 @@ def _measure_all(
     s, found = scene.settings, list[Array]()
     for i, each in enumerate(scene.barriers.items):
         if isinstance(each, Zone):
-            person, zone = scene.people[i], scene.person_zones[i]
+            person = scene.people[i]
             center, growth = _find_places(person, times, s, as_predicted)
-            measured = np.hypot(*(points - center).T) - BODY_RADIUS
+            offset = points - center
+            measured = np.hypot(*offset.T) - BODY_RADIUS
             if is_barrier:
-                offset, heading = points - center, person.heading or 0.0
+                zone, heading = scene.person_zones[i], person.heading or 0.0
                 measured = _measure_zone(offset, heading, zone) - growth
         elif isinstance(each, Wall):
-            measured = (_measure_wall if is_barrier else _measure_segment)(points, each)
+            measured = _measure_wall(points, each, is_barrier)
         else:
-            measure = each.distance if is_barrier else each.gap
-            measured = np.array(
-                [
-                    measure(*p, t, *each.numbers)
-                    for p, t in zip(points, times, strict=True)
-                ]
-            )
+            measure, places = each.distance if is_barrier else each.gap, points.T
+            own = zip(*places.tolist(), times.tolist(), strict=True)
+            measured = np.array([measure(*place, *each.numbers) for place in own])
         margin = each.margin(s) if is_barrier else 0.0
         found.append(measured - s.r_robot - margin)
     return np.reshape(found, (-1, len(points)))
@@ -516,29 +481,24 @@ def _find_places(
 
 def _measure_zone(offset: Array, heading: float, zone: Ellipse) -> Array:
     """Focal distance to a zone of a person at these offsets of the robot (paper, eq. 7)."""
-    c, n, tilt = np.cos(heading), np.sin(heading), heading + zone.angle
-    offset = offset - np.array([[c, -n], [n, c]]) @ np.array(zone.center)
-    along = offset @ (np.cos(tilt), np.sin(tilt))
-    across = offset @ (-np.sin(tilt), np.cos(tilt))
-    (a, b) = zone.semi_axes
-    f = np.sqrt((a - b) * (a + b))
-    return np.asarray(
-        (np.hypot(along - f, across) + np.hypot(along + f, across)) / 2 - a
+    # complex numbers: the robot, seen along the zone's major axis from its centre
+    seen = (offset @ (1, 1j) * np.exp(-1j * heading) - complex(*zone.center)) * np.exp(
+        -1j * zone.angle
     )
+    a, b = zone.semi_axes
+    focus = np.sqrt((a - b) * (a + b))
+    return np.asarray((np.abs(seen - focus) + np.abs(seen + focus)) / 2 - a)
 
 
-def _measure_wall(points: Array, wall: Wall) -> Array:
-    """Approximate distance to a wall (paper, eq. 3-5)."""
-    start, end = np.reshape(wall.numbers, (2, 2))
-    length = np.hypot(*(end - start))
-    (ux, uy), (px, py) = (end - start) / length, (points - (start + end) / 2).T
-    t = length / 4 - (px**2 + py**2) / length
-    return np.asarray(np.hypot(px * uy - py * ux, np.minimum(t, 0.0)))
-
-
-def _measure_segment(points: Array, wall: Wall) -> Array:
-    """Euclidean distance to a wall, by a clamped projection."""
-    start, end = np.reshape(wall.numbers, (2, 2))
-    along = (points - start) @ (end - start) / ((end - start) ** 2).sum()
-    nearest = start + np.clip(along, 0.0, 1.0)[:, None] * (end - start)
-    return np.asarray(np.hypot(*(points - nearest).T))
+def _measure_wall(points: Array, wall: Wall, is_barrier: bool) -> Array:
+    """Approximate distance to a wall (paper, eq. 3-5), or the Euclidean one."""
+    xa, ya, xb, yb = wall.numbers
+    start, along = complex(xa, ya), complex(xb - xa, yb - ya)
+    length = abs(along)
+    # complex numbers: along the wall from its middle, and across
+    seen = (points @ (1, 1j) - start) / (along / length) - length / 2
+    if is_barrier:
+        beyond = np.maximum((np.abs(seen) ** 2 - length**2 / 4) / length, 0.0)
+    else:
+        beyond = np.maximum(np.abs(seen.real) - length / 2, 0.0)
+    return np.asarray(np.hypot(seen.imag, beyond))

@@ -15,8 +15,9 @@ The robot keeps its way until another one is `SWITCH_GAIN` cheaper, so that it d
 
 from __future__ import annotations
 
+from cmath import phase, rect
 from collections.abc import Hashable, Sequence
-from math import acos, atan2, ceil, cos, dist, hypot, inf, pi, sin, sqrt
+from math import acos, ceil, dist, hypot, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,21 +26,11 @@ from scipy.ndimage import binary_dilation
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from ..checks import Array, check_number, check_point, require
-from ..errors import SolverError
+from ..checks import Array
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import (
-    Group,
-    Obstacles,
-    Wall,
-    Zone,
-    barrier,
-    find_bodies,
-    find_places,
-)
+from .obstacles import Obstacles, Zone, barrier, find_bodies, find_places
 from .people import STANDING_SPEED
 from .settings import MPCSettings
-from .walls import read_walls
 
 Point = tuple[float, float]
 Cells = NDArray[np.intp]
@@ -179,16 +170,13 @@ class Map:
         covered = np.zeros(self.shape, bool)
         for kind, numbers, given in fixed.groups:
             offsets = np.maximum(given, _MOST_SHARE * self.cell)
-            ends = [
-                ((each - self.corner) / self.cell).clip(0, self.shape)
-                for each in kind.bounds(numbers, offsets)
-            ]
-            first, last = (each.astype(int) for each in (ends[0], ends[1] + 1))
-            last = np.minimum(last, self.shape)
+            low, high = (each - self.corner for each in kind.bounds(numbers, offsets))
+            first = (low / self.cell).clip(0, self.shape).astype(int)
+            last = (high / self.cell + 1).clip(0, self.shape).astype(int)
             size = np.maximum(last - first, 0)
             counts = size.prod(axis=1)
-            parts = np.flatnonzero(np.diff(counts.cumsum() // _CHUNK)) + 1
-            for rows in np.split(np.arange(len(counts)), parts):
+            n_parts = 1 + min(len(counts), int(counts.sum() // _CHUNK))
+            for rows in np.array_split(np.arange(len(counts)), n_parts):
                 which = np.repeat(rows, counts[rows])
                 begins = counts[rows].cumsum() - counts[rows]
                 place = np.arange(len(which)) - np.repeat(begins, counts[rows])
@@ -265,9 +253,9 @@ class Map:
         self.seconds_to_goal, self.end = np.full(self.shape, inf), cell
         self.seconds_to_goal[self.free] = far
 
-    def descend(self, cell: tuple[int, ...]) -> Array:
+    def descend(self, cell: Any) -> Array:
         """Centres of the cells from `cell` to the end, shape (n, 2) [m]."""
-        found, k = list[int](), int(self._numbers[cell])
+        found, k = list[int](), int(self._numbers[*cell])
         while k >= 0:
             found.append(k)
             k = int(self._next[k])
@@ -289,55 +277,14 @@ class Map:
             ~(blocked[self.locate(start + offsets)] & is_away).any(axis=0)
         )
 
-
-def find_route(
-    start: ArrayLike, goal: ArrayLike, walls: Any, clearance: float
-) -> Array:
-    """Find a short way from `start` to `goal` around `walls`: a polyline, shape (m, 2) [m].
-
-    It is some 3 % longer than the shortest one: it leads over cells of at most `CELL`.
-
-    Parameters
-    ----------
-    start, goal : (x, y) [m].
-    walls : as of `MPCCBF`.
-    clearance : distance to keep from walls [m]; at least 6 cm. A `start` or `goal` nearer to a wall begins or
-        ends at the nearest place that is free.
-
-    Returns
-    -------
-    The corners of the way, with start and goal; empty, shape (0, 2), if there is none.
-
-    Raises
-    ------
-    SolverError : a number or a wall cannot be used.
-
-    Examples
-    --------
-    >>> from szlib.control import find_route
-    >>> route = find_route((0.0, 0.0), (4.0, 0.0), walls=[[(2.0, -1.0), (2.0, 5.0)]], clearance=0.5)
-    >>> bool(route[:, 1].min() < -1.4)  # around the lower end
-    True
-    """
-    c, at, end = (
-        check_number("clearance", clearance),
-        check_point("start", start),
-        check_point("goal", goal),
-    )
-    require(c >= 0, "clearance", clearance, "a number >= 0", SolverError)
-    segments, c = read_walls(walls), max(c, _LEAST)
-    length = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
-    group = Group(Wall, segments.reshape(-1, 4), c + c**2 / length)
-    found = Map(Obstacles((group,), c), np.array([at, end]), _choose_cell(c))
-    if not found.measure(at, end, 1.0, np.zeros(found.shape)):
-        return np.zeros((0, 2))
-    points = np.vstack([at, found.descend(found.find_cell(at))[1:-1], end])
-    corners = [0]
-    while corners[-1] < len(points) - 1:
-        ahead = points[corners[-1] + 1 :]
-        seen = np.flatnonzero(found.sees(points[corners[-1]], ahead, ~found.free))
-        corners.append(corners[-1] + 1 + int(seen.max(initial=0)))
-    return points[corners]
+    def list_around(self, at: Point, people: Array) -> Array:
+        """Places of `people`, and those near `at` that are not free, at `_TIMES`, shape (n, k, 2) [m]."""
+        size = ceil(SEARCH_RADIUS / self.cell)
+        low = np.maximum(np.array(self.find_cell(at)) - size, 0)
+        i, j = np.array(self.find_cell(at)) + size
+        fixed = np.argwhere(~self.free[low[0] : i, low[1] : j]) + low
+        still = self.centers(fixed[:: 1 + len(fixed) // _PLACES])[:, None]
+        return np.concatenate([people, np.repeat(still, len(_TIMES), axis=1)])
 
 
 def _choose_cell(clearance: float) -> float:
@@ -366,11 +313,7 @@ class WayFinder:
         self._n_people, self._known = 0, tuple[Any, ...]()
 
     def find(
-        self,
-        at: Point,
-        goal: Point,
-        zones: Obstacles,
-        groups: Sequence[Hashable] = (),
+        self, at: Point, goal: Point, zones: Obstacles, groups: Sequence[Hashable]
     ) -> Heading:
         """The way from `at` to the `goal` among people with these `zones` and `groups`."""
         if dist(goal, self._goal) > _GOAL_MOVED:
@@ -378,27 +321,22 @@ class WayFinder:
         m = self._get_map(at, goal)
         is_searched = not self._steps or zones.size != self._n_people
         if is_searched:
-            self._search(at, goal, _Stamps(zones, groups, m.cell, self._s))
+            self._search(m, at, goal, _Stamps(zones, groups, m.cell, self._s))
             self._steps, self._n_people = self._every, zones.size
         self._steps -= 1
-        heading = self._find_target(at, goal, self._ways[0].points, self._blocked)
-        length, ways = heading.length if self._is_reached else inf, tuple(self._ways)
-        return heading._replace(length=length, ways=ways, is_searched=is_searched)
+        target, length = self._find_target(m, at, self._ways[0].points, self._blocked)
+        length = length if self._is_reached else inf
+        return Heading(target, length, tuple(self._ways), is_searched)
 
     def follow(self, at: Point, goal: Point, route: Array) -> Heading | None:
         """The target from `at` on a `route` to the `goal`, shape (m, 2) [m]; None if no point is in sight."""
         m, self._steps = self._get_map(at, goal), 0
-        corners = np.vstack([route, goal])
-        lengths = _time(corners, 1.0)
-        along = np.linspace(0, lengths[-1], 2 + int(lengths[-1] / m.cell))
-        points = np.column_stack(
-            [np.interp(along, lengths, each) for each in corners.T]
-        )
+        points = _sample_line(np.vstack([route, goal]), m.cell)
         begin = int(np.hypot(*(points - at).T).argmin())
         near = points[begin:][: 1 + int(min(self._s.lookahead, _FARTHEST) / m.cell)]
         if not m.sees(np.array(at), near, ~m.free).any():
             return None
-        return self._find_target(at, goal, points, ~m.free)
+        return Heading(*self._find_target(m, at, points, ~m.free))
 
     def _get_map(self, at: Point, goal: Point) -> Map:
         """The map that holds these points."""
@@ -408,9 +346,8 @@ class WayFinder:
             self._steps = 0
         return self._map
 
-    def _search(self, at: Point, goal: Point, stamps: _Stamps) -> None:
+    def _search(self, m: Map, at: Point, goal: Point, stamps: _Stamps) -> None:
         """Find the ways anew, and choose one."""
-        m = self._get_map(at, goal)
         places = stamps.find_places(_TIMES)
         is_near = np.hypot(*(places[:, 0] - at).T) < _PEOPLE
         moved = np.hypot(*(places[:, _LAST] - places[:, 0]).T)
@@ -424,7 +361,7 @@ class WayFinder:
             self._is_reached = m.measure(at, goal, self._s.v_max, price[0])
             self._known, self._blocked = known, ~m.free | (price[0] >= BODY_SECOND)
         walks = np.flatnonzero(is_near & ~stands)
-        around = self._list_around(m, at, people)
+        around = m.list_around(at, people)
         found = self._find_ways(m, at, goal, people, around, stamps, walks)
         ways = sorted(found, key=lambda way: way.cost)
         if self._ways:
@@ -432,11 +369,13 @@ class WayFinder:
             kept = [way for way in ways if not _differ(way, before, around)]
             if kept and kept[0].cost < ways[0].cost + SWITCH_GAIN:
                 ways = [kept[0], *(way for way in ways if way is not kept[0])]
-        names = [_name(m, way, people, near.tolist()) for way in ways]
-        if not self._is_reached:
-            names = ["to the nearest point that it can reach"] * len(ways)
-        pairs = zip(ways, names, strict=True)
-        self._ways = [way._replace(name=name) for way, name in pairs]
+        nearest = "to the nearest point that it can reach"
+        self._ways = [
+            way._replace(
+                name=_name(m, way, people, near) if self._is_reached else nearest
+            )
+            for way in ways
+        ]
 
     def _find_ways(
         self,
@@ -449,85 +388,68 @@ class WayFinder:
         walks: Cells,
     ) -> list[Way]:
         """Distinct ways on the map `m` among `people`; those in the rows `walks` of `stamps` walk."""
-        v_max = self._s.v_max
+        v_max, shape = self._s.v_max, np.array(m.shape)
         start = np.array(m.find_cell(at, np.isfinite(m.seconds_to_goal)))
         size = ceil(SEARCH_RADIUS / m.cell)
-        low, high = np.maximum(start - size, 0), np.minimum(start + size + 1, m.shape)
-        window = tuple(slice(*ends) for ends in zip(low, high, strict=True))
-        far, begin = m.seconds_to_goal[window], tuple((start - low).tolist())
+        low = np.maximum(start - size, 0)
+        window = tuple(map(slice, low, np.minimum(start + size + 1, shape)))
+        far, begin = m.seconds_to_goal[window], start - low
         ends = np.array(goal)[None] if self._is_reached else np.zeros((0, 2))
         dt = 1.2 * m.cell / v_max  # between a step along an axis and a diagonal one
         times: Array = dt * np.arange(1.0, ceil(SEARCH_TIME / dt) + 1)
         prices = np.zeros((len(times), *far.shape))
         stamps.add(prices, walks, times, m.corner + low * m.cell)
         if not prices.any() and not m.price[window].any():
-            points = np.vstack([at, m.descend(tuple(start.tolist()))[1:], ends])
+            points = np.vstack([at, m.descend(start)[1:], ends])
             if len(ends) and m.sees(points[0], ends, ~m.free)[0]:
                 points = np.linspace(at, goal, len(points))
-            return [Way(points, _time(points, v_max), float(far[begin]))]
+            return [Way(points, _time(points, v_max), float(far[tuple(begin)]))]
         costs = (dt * (1 + m.price[window] + prices)).astype(np.float32)
         costs[:, ~m.free[window]] = inf
         end = np.array(m.end) - low
         if (end >= 0).all() and (end < far.shape).all():
             costs[:, end[0], end[1]] = 0.0  # a robot at its goal may stay there
         ways, again = list[Way](), np.zeros(far.shape, np.float32)
-        layers, tube = (
-            np.arange(len(times)),
-            np.ones(2 * [2 * int(_NEAR_WAY / m.cell) + 1]),
-        )
+        tube = np.ones(2 * [2 * int(_NEAR_WAY / m.cell) + 1])
         while len(ways) < MOST_WAYS:
             cells = _cross_layers(costs + again, begin, far)
-            then = tuple(cells[-1].tolist())
-            rest = m.descend(tuple((low + then).tolist()))[1:]
-            points, k = (
-                np.vstack([at, m.centers(low + cells[1:]), rest, ends]),
-                len(cells) - 1,
-            )
+            k, then = len(cells) - 1, cells[-1]
+            rest = m.descend(low + then)[1:]
+            points = np.vstack([at, m.centers(low + cells[1:]), rest, ends])
             begun = np.concatenate([[0.0], times[:k]])
             late = begun[-1] + _time(points[k:], v_max)[1:]
-            cost = float(costs[layers[:k], *cells[1:].T].sum() + far[then])
-            way = Way(points, np.concatenate([begun, late]), cost)
-            way = way._replace(cost=cost + self._price_sides(way, people))
+            within = costs[np.arange(k), *cells[1:].T].sum()
+            way = Way(points, np.concatenate([begun, late]), float(within + far[*then]))
+            way = way._replace(cost=way.cost + self._price_sides(way, people))
             if any(not _differ(way, each, around) for each in ways):
                 break
             ways.append(way)
             used = np.zeros(far.shape, bool)
-            used[tuple(cells.T)] = np.hypot(*(cells - begin).T) * m.cell > 2 * _NEAR_WAY
+            used[*cells.T] = np.hypot(*(cells - begin).T) * m.cell > 2 * _NEAR_WAY
             again += np.float32(dt * REPEAT_SECOND) * binary_dilation(used, tube)
         return ways
 
-    @staticmethod
-    def _list_around(m: Map, at: Point, people: Array) -> Array:
-        """Places of `people`, and those that are not free, at `_TIMES`, shape (n, k, 2) [m]."""
-        size = ceil(SEARCH_RADIUS / m.cell)
-        i, j = (each - size for each in m.find_cell(at))
-        around = m.free[max(i, 0) : i + 2 * size, max(j, 0) : j + 2 * size]
-        fixed = np.argwhere(~around)
-        fixed = fixed[:: 1 + len(fixed) // _PLACES] + np.maximum([i, j], 0)
-        still = np.repeat(m.centers(fixed)[:, None], len(_TIMES), axis=1)
-        return np.concatenate([people, still])
-
     def _price_sides(self, way: Way, people: Array) -> float:
         """Price of a `way` that meets `people` head-on, and passes on the side that is not preferred [s]."""
-        ahead = way.points[-1] - way.points[0]
+        x, y = way.points[-1] - way.points[0]
         vx, vy = (people[:, 1] - people[:, 0]).T / _TICK
-        across = np.abs(ahead[0] * vy - ahead[1] * vx)
-        share = self._s.head_on_share * np.hypot(vx, vy) * np.hypot(*ahead)
-        meets = (across <= share) & (ahead[0] * vx + ahead[1] * vy <= 0)
+        share = self._s.head_on_share * np.hypot(vx, vy) * np.hypot(x, y)
+        meets = (np.abs(x * vy - y * vx) <= share) & (x * vx + y * vy <= 0)
         sign = 1 if self._s.pass_side == "right" else -1
-        turns = sign * _find_turns(way, people)
-        return SIDE_PRICE * bool((meets & (turns < -pi / 2)).any())
+        is_other = sign * _find_turns(way, people) < -pi / 2
+        return SIDE_PRICE * bool((meets & is_other).any())
 
     def _find_target(
-        self, at: Point, goal: Point, points: Array, blocked: Mask
-    ) -> Heading:
-        """The target on the way through these `points`: the farthest one in sight, at most `lookahead` away.
+        self, m: Map, at: Point, points: Array, blocked: Mask
+    ) -> tuple[Point, float]:
+        """The target on the way through these `points`, and the length of the way [m].
 
-        Behind it the target goes on straight ahead while this is free, so that the robot does not stop there.
+        It is the farthest one in sight, at most `lookahead` away. Behind it the target goes on straight ahead
+        while this is free, so that the robot does not stop there.
         """
-        m, p = self._get_map(at, goal), np.array(at)
+        p, lookahead = np.array(at), self._s.lookahead
         points = points[int(np.hypot(*(points - p).T).argmin()) :]
-        lengths, lookahead = _time(np.vstack([p, points]), 1.0)[1:], self._s.lookahead
+        lengths = _time(np.vstack([p, points]), 1.0)[1:]
         n = int(np.searchsorted(lengths, min(lookahead, _FARTHEST)))
         n = max(n, min(2, len(points)))  # the next cell of a large map may be farther
         choice = np.unique(np.r_[min(1, n - 1) : min(8, n), 8:n:3, n - 1])
@@ -538,14 +460,13 @@ class WayFinder:
         i = max(int(seen.max(initial=0)), min(around, n - 1))
         last, left = points[i], float(lengths[-1] - lengths[i])
         gone = float(np.hypot(*(last - p)))
-        if not left or gone < 2 * m.cell:
-            return Heading((float(last[0]), float(last[1])), gone + left)
-        reach = min(lookahead, gone + left)
-        shares = np.linspace(reach / (gone or 1.0), 1.0, 12)
-        beyond = p + shares[:, None] * (last - p)
-        free = m.sees(p, beyond, blocked)
-        x, y = (beyond[free.argmax()] if free.any() else last).tolist()
-        return Heading((x, y), gone + left)
+        if left and gone >= 2 * m.cell:
+            shares = np.linspace(min(lookahead, gone + left) / gone, 1.0, 12)
+            beyond = p + shares[:, None] * (last - p)
+            free = m.sees(p, beyond, blocked)
+            last = beyond[free.argmax()] if free.any() else last
+        x, y = last.tolist()
+        return (x, y), gone + left
 
 
 def _find_turns(way: Way, around: Array) -> Array:
@@ -567,57 +488,52 @@ class _Stamps:
     Parameters
     ----------
     zones : of all people.
-    groups : to which they belong, None for somebody of whom this is not known; empty: it is known of nobody.
+    groups : to which they belong, None for somebody of whom this is not known.
     cell : side of a cell [m].
     s : settings of the robot.
     """
 
     def __init__(
-        self,
-        zones: Obstacles,
-        groups: Sequence[Hashable],
-        cell: float,
-        s: MPCSettings,
+        self, zones: Obstacles, groups: Sequence[Hashable], cell: float, s: MPCSettings
     ) -> None:
         self._cell, self._zones, self.n_people = cell, zones, zones.size
         if not zones.groups:
             return
         own, bodies = zones.groups[0], find_bodies(zones, s).groups[0]
-        people = own.numbers[:, 5:9]
-        foci = np.abs(own.numbers[:, :4] - np.tile(people[:, 2:], 2)).max()
+        at, velocity = own.numbers[:, 5:7], own.numbers[:, 7:9]
+        foci = np.abs(own.numbers[:, :4] - np.tile(at, 2)).max()
         reach = foci + float((own.numbers[:, 4] + own.offsets).max())
         reach = max(reach, BODY_RADIUS + float(bodies.offsets.max()))
-        reach = ceil(min(reach, 2 * SEARCH_RADIUS) / cell)
-        steps = np.arange(-reach, reach + 1)
-        cells = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1)
-        x, y = np.moveaxis(people[:, None, None, 2:] + cell * cells, -1, 0)
-        prices = np.zeros(x.shape)
+        n = ceil(min(reach, 2 * SEARCH_RADIUS) / cell)
+        x, y = cell * np.mgrid[-n : n + 1, -n : n + 1]
+        prices = np.zeros((zones.size, *x.shape))
         for (kind, numbers, offsets), price in (
             (own, ZONE_SECOND),
             (bodies, BODY_SECOND),
         ):
-            d = kind.distance(x, y, 0.0, *numbers.T[..., None, None])
+            px, py = at.T[..., None, None]
+            d = kind.distance(px + x, py + y, 0.0, *numbers.T[..., None, None])
             prices[d < offsets[:, None, None]] = price
-        i, j = np.triu_indices(len(people), 1)
-        apart = np.hypot(*(people[i] - people[j])[:, 2:].T)
-        differ = np.hypot(*(people[i] - people[j])[:, :2].T)
-        together = (apart < GROUP_DISTANCE) & (differ < GROUP_SPEED)
-        if any(group is not None for group in groups):
-            pairs = zip(i.tolist(), j.tolist(), strict=True)
-            is_same = [groups[a] == groups[b] for a, b in pairs]
-            is_known = np.array([group is not None for group in groups])
-            known = is_known[i] & is_known[j]
-            together[known] = (np.array(is_same) & (apart < _GROUP_REACH))[known]
-        i, j, apart = i[together], j[together], apart[together]
-        between = np.hypot(*cells.T) * cell < apart[:, None, None] / 2
+        i, j = np.triu_indices(zones.size, 1)
+        apart = np.hypot(*(at[i] - at[j]).T)
+        differ = np.hypot(*(velocity[i] - velocity[j]).T)
+        named = [each for each in dict.fromkeys(groups) if each is not None]
+        group = np.array([named.index(e) if e in named else -1 for e in groups])
+        together = np.where(
+            (group[i] >= 0) & (group[j] >= 0),
+            (group[i] == group[j]) & (apart < _GROUP_REACH),
+            (apart < GROUP_DISTANCE) & (differ < GROUP_SPEED),
+        )
+        self._pairs = i[together], j[together]
+        between = np.hypot(x, y) < apart[together, None, None] / 2
         self._prices = np.concatenate([prices, GROUP_SECOND * between])
-        self._pairs = i, j
 
     def find_places(self, times: Array) -> Array:
         """Places of people, and of the middles of pairs, at these `times`, shape (n, k, 2) [m]."""
-        if not self._zones.groups:
-            return np.zeros((0, len(times), 2))
-        people, (i, j) = find_places(self._zones.groups[0], times), self._pairs
+        people = find_places(self._zones, times)
+        if not len(people):
+            return people
+        i, j = self._pairs
         return np.concatenate([people, (people[i] + people[j]) / 2])
 
     def add(self, prices: Array, rows: Cells, times: Array, corner: Array) -> None:
@@ -636,7 +552,7 @@ class _Stamps:
                 np.maximum(part, own, out=part)
 
 
-def _cross_layers(costs: Any, begin: tuple[int, ...], far: Array) -> Array:
+def _cross_layers(costs: Any, begin: Any, far: Array) -> Array:
     """Cells of the cheapest way through layers of `costs`, one in each, shape (k + 1, 2).
 
     It begins in the cell `begin`, and ends in the last layer, or in any at the edge: where its cost and `far`
@@ -651,12 +567,12 @@ def _cross_layers(costs: Any, begin: tuple[int, ...], far: Array) -> Array:
         then[1:-1, 1:-1] = np.minimum(both, across[:, 1:-1]) + cost
     ends = layers[:, 1:-1, 1:-1] + far
     ends[:-1, 1:-1, 1:-1] = inf
-    k, i, j = (int(each) for each in np.unravel_index(ends.argmin(), ends.shape))
-    cells = [(i, j)]
+    k, i, j = np.unravel_index(ends.argmin(), ends.shape)
+    cells = [np.array([i, j])]
     for layer in layers[:k][::-1]:
         i, j = cells[-1]
-        a, b = divmod(int((layer[i : i + 3, j : j + 3] + step * _MOVES).argmin()), 3)
-        cells.append((i + a - 1, j + b - 1))
+        best = (layer[i : i + 3, j : j + 3] + step * _MOVES).argmin()
+        cells.append(cells[-1] + np.divmod(best, 3) - 1)
     return np.array(cells[::-1])
 
 
@@ -666,83 +582,74 @@ def _time(points: Array, speed: float) -> Array:
     return np.concatenate([[0.0], lengths.cumsum() / speed])
 
 
+def _sample_line(corners: Array, piece: float, longest: float = inf) -> Array:
+    """Points on a line through `corners`, at most a `piece` apart, and at most so far along it [m]."""
+    lengths = _time(corners, 1.0)
+    end = min(float(lengths[-1]), longest)
+    along = np.linspace(0, end, 2 + int(end / piece))
+    return np.column_stack([np.interp(along, lengths, each) for each in corners.T])
+
+
 def _cut(way: Way, at: Point) -> Way:
     """What is left of a `way` for a robot that is `at` this point."""
     k = int(np.hypot(*(way.points - at).T).argmin())
-    return way._replace(
-        points=np.vstack([at, way.points[k + 1 :]]), times=way.times[k:] - way.times[k]
-    )
+    left = np.vstack([at, way.points[k + 1 :]])
+    return way._replace(points=left, times=way.times[k:] - way.times[k])
 
 
 def _find_door(m: Map, way: Way) -> list[tuple[float, str]]:
     """When a way leads through the first door, and where: it is narrow, with more room before and behind."""
-    lengths = _time(way.points, 1.0)
-    along = np.arange(0.0, min(float(lengths[-1]), 2 * SEARCH_RADIUS), m.cell)
-    places = np.column_stack([np.interp(along, lengths, each) for each in way.points.T])
-    if len(places) < 3:
-        return []
+    places = _sample_line(way.points, m.cell, 2 * SEARCH_RADIUS)
     ahead = np.gradient(places, axis=0)
-    across = np.column_stack([-ahead[:, 1], ahead[:, 0]])
-    across /= np.maximum(np.hypot(*across.T), 1e-9)[:, None]
-    aside = np.arange(m.cell, _DOOR + m.cell, m.cell)[:, None, None]
-    left, right = (
-        ~m.free[m.locate(places + side * aside * across)].all(axis=0)
-        for side in (-1, 1)
-    )
-    n = ceil(_DOOR / m.cell)
-    narrow = np.pad(left & right, n)
-    doors = np.flatnonzero(narrow[n:-n] & ~narrow[: -2 * n] & ~narrow[2 * n :])
-    doors = doors[doors - doors[:1] == np.arange(len(doors))]  # the first one
-    return [
-        (
-            float(np.interp(along[k], lengths, way.times)),
-            "through the door at ({:.1f}, {:.1f})".format(*places[k]),
-        )
-        for k in doors[len(doors) // 2 :][:1]
-    ]
+    across = ahead[:, ::-1] * (-1, 1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    aside = np.arange(m.cell, _DOOR + m.cell, m.cell)[:, None, None] * across
+    left, right = (~m.free[m.locate(places + s * aside)].all(axis=0) for s in (-1, 1))
+    ends = np.flatnonzero(np.diff(np.pad(left & right, 1)))
+    for first, last in ends.reshape(-1, 2).tolist():
+        if first and last < len(places) and (last - first) * m.cell < 2 * _DOOR:
+            x, y = places[(first + last - 1) // 2]
+            k = int(np.hypot(*(way.points - (x, y)).T).argmin())
+            return [(way.times[k], f"through the door at ({x:.1f}, {y:.1f})")]
+    return []
 
 
-def _name(m: Map, way: Way, people: Array, numbers: Sequence[int]) -> str:
+def _name(m: Map, way: Way, people: Array, numbers: Cells) -> str:
     """A way in words: a door, the side of people whom it passes, and for whom it waits."""
-    times, found = _TIMES, _find_door(m, way)
-    points = way.at(times)
+    found, points = _find_door(m, way), way.at(_TIMES)
     for number, places in zip(numbers, people, strict=True):
         offset = points - places
         k = int(np.hypot(*offset.T).argmin())
-        if not 0 < k < len(times) - 1 or np.hypot(*offset[k]) > _NAMED_WITHIN:
+        if not 0 < k < len(_TIMES) - 1 or np.hypot(*offset[k]) > _NAMED_WITHIN:
             continue
-        dx, dy = points[min(k + 5, 120)] - points[max(k - 5, 0)]
+        dx, dy = points[k + 1 :][:5][-1] - points[max(k - 5, 0)]
         (x, y), (vx, vy) = offset[k], (places[k + 1] - places[k]) / _TICK
-        if abs(dx * vy - dy * vx) > 0.5 * hypot(dx, dy) * max(
-            hypot(vx, vy), STANDING_SPEED
-        ):
+        walks = max(hypot(vx, vy), STANDING_SPEED)
+        side = "left of" if dx * y - dy * x > 0 else "right of"
+        if abs(dx * vy - dy * vx) > 0.5 * hypot(dx, dy) * walks:
             side = "in front of" if x * vx + y * vy > 0 else "behind"
-        else:
-            side = "left of" if dx * y - dy * x > 0 else "right of"
-        found.append((times[k], f"{side} person {number}"))
+        found.append((_TIMES[k], f"{side} person {number}"))
     words = [word for _, word in sorted(found)[:_NAMED]]
     moved = np.hypot(*np.diff(points, axis=0).T)
     away = np.hypot(*(way.points - way.points[-1]).T) > 2 * m.cell
-    arrival = way.times[np.flatnonzero(away)].max(initial=0.0)
-    rests = (moved < 0.2 * moved.max(initial=0.0)) & (times[1:] < arrival)
+    arrival = way.times[away].max(initial=0.0)
+    rests = (moved < 0.2 * moved.max(initial=0.0)) & (_TIMES[1:] < arrival)
     if rests.sum() >= _WAITING and len(people):
         last = points[np.flatnonzero(rests)[-1]]
-        gaps = np.hypot(*(people[:, 0] - last).T)
-        words.insert(0, f"waits for person {numbers[int(gaps.argmin())]}")
-    straight = float(np.hypot(*(way.points[-1] - way.points[0])))
+        k = int(np.hypot(*(people[:, 0] - last).T).argmin())
+        words.insert(0, f"waits for person {numbers[k]}")
+    straight = dist(way.points[-1], way.points[0])
     is_straight = _time(way.points, 1.0)[-1] < 1.05 * straight + m.cell
-    return ", ".join(words) or (
-        "straight to the goal" if is_straight else "around walls"
-    )
+    usual = "straight to the goal" if is_straight else "around walls"
+    return ", ".join(words) or usual
 
 
 def find_target(
-    position: tuple[float, float],
-    goal: tuple[float, float],
+    position: Point,
+    goal: Point,
     zones: Sequence[Sequence[float]],
     fixed: Obstacles,
     settings: MPCSettings,
-) -> tuple[float, float]:
+) -> Point:
     """Find the point that attracts the plan [m]: the goal, or one beside a person who is met head-on.
 
     Parameters
@@ -770,102 +677,42 @@ def find_target(
     walk across the way, because they clear it themselves, nor for a person who stands on the goal. The
     nearest person counts.
     """
-    s = settings
-    (x, y), way = position, (goal[0] - position[0], goal[1] - position[1])
-    distance = hypot(*way)
-    if distance == 0 or s.head_on_share == 0:
-        return goal
-    nearest, target = inf, goal
-    for zone in zones:
-        vx, vy = zone[5:7]
-        speed = hypot(vx, vy)
-        if abs(_cross(way, (vx, vy))) > s.head_on_share * speed * distance:
-            continue
-        h = barrier(Zone.distance(x, y, 0.0, *zone), s.r_robot, s.eps)
-        closing = (s.v_max + speed) * s.dt
+    # complex numbers: the conjugate of u times v has the angle from u to v
+    s, at, end = settings, complex(*position), complex(*goal)
+    way, nearest, target = end - at, inf, end
+    for zone in zones if way and s.head_on_share else ():
+        velocity, h = complex(*zone[7:9]), _find_h(zone, position, s)
+        across = abs((way.conjugate() * velocity).imag)
+        closing = (s.v_max + abs(velocity)) * s.dt
         reach = max(closing / s.gamma, closing * sum(s.step_lengths))
-        if h > min(nearest, distance, reach):
+        a, b = complex(*zone[:2]) - at, complex(*zone[2:4]) - at
+        is_head_on = across <= s.head_on_share * abs(velocity) * abs(way)
+        if not is_head_on or h > min(nearest, abs(way), reach) or not a * b:
             continue
-        angles = _find_angles(zone, position, way, s)
-        if angles is None:
+        nearest, target = h, end
+        semi_axis = zone[4] + s.r_robot + s.eps  # of the set h < 0
+        cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
+        w = acos(max(-1.0, min(1.0, cosine))) / 2
+        bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
+        stands_on = abs(velocity) < STANDING_SPEED and _find_h(zone, goal, s) < 0
+        if not w or stands_on:
             continue
-        nearest, target = h, goal
-        turn = _find_turn(zone, goal, way, *angles, fixed, s)
-        if turn is not None:
-            c, d = cos(turn), sin(turn)
-            target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])
-    return target
+        for side in (1, -1) if s.pass_side == "left" else (-1, 1):
+            lead = side * bearing / (s.head_on_share * w)
+            if not -1 <= lead < 2:
+                continue
+            # from the zone's centre to where the robot passes
+            beside = side * 1j * way / abs(way)
+            half = (a - b) / 2
+            width = sqrt(semi_axis**2 - (half.conjugate() * beside).imag ** 2)
+            points = at + (a + b) / 2 + width * beside * _ALONG
+            if (fixed.h(points.real, points.imag) >= 0).all():
+                turn = (side * w - bearing) * min(1.0, 2 - lead)
+                target = at + way * rect(1.0, turn)
+                break
+    return target.real, target.imag
 
 
-def _find_angles(
-    zone: Sequence[float],
-    position: tuple[float, float],
-    way: tuple[float, float],
-    s: MPCSettings,
-) -> tuple[float, float] | None:
-    """w, half the angle between the tangents, and b, that of the way from their middle; None on a focus."""
-    (x, y), (xa, ya, xb, yb, *_) = position, zone
-    to_a, to_b = (xa - x, ya - y), (xb - x, yb - y)
-    ra, rb = hypot(*to_a), hypot(*to_b)
-    if ra * rb == 0:
-        return None
-    inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
-    cosine = (ra**2 + rb**2 - 4 * _unsafe_semi_axis(zone, s) ** 2) / (2 * ra * rb)
-    w = acos(max(-1.0, min(1.0, cosine))) / 2
-    return w, atan2(_cross(inward, way), inward[0] * way[0] + inward[1] * way[1])
-
-
-def _find_turn(
-    zone: Sequence[float],
-    goal: tuple[float, float],
-    way: tuple[float, float],
-    w: float,
-    b: float,
-    fixed: Obstacles,
-    s: MPCSettings,
-) -> float | None:
-    """Angle by which the way is turned to a free side, `pass_side` first [rad]; None if it is not turned."""
-    if s.head_on_share * w == 0:
-        return None
-    for left in (s.pass_side == "left", s.pass_side != "left"):
-        lead = (b if left else -b) / (s.head_on_share * w)
-        if not -1 <= lead < 2:
-            continue
-        if _is_side_free(zone, way, left, fixed, s) and not blocks(zone, goal, s):
-            return ((w if left else -w) - b) * min(1.0, 2 - lead)
-    return None
-
-
-def _unsafe_semi_axis(zone: Sequence[float], s: MPCSettings) -> float:
-    """Semi-major axis of the set h < 0 [m]."""
-    return zone[4] + s.r_robot + s.eps
-
-
-def _is_side_free(
-    zone: Sequence[float],
-    way: tuple[float, float],
-    left: bool,
-    fixed: Obstacles,
-    s: MPCSettings,
-) -> bool:
-    """True if nothing fixed stands between the zone's centre and where the robot passes on that side."""
-    length = hypot(*way) if left else -hypot(*way)
-    beside = (-way[1] / length, way[0] / length)
-    xa, ya, xb, yb, *_ = zone
-    half = ((xa - xb) / 2, (ya - yb) / 2)
-    width = sqrt(_unsafe_semi_axis(zone, s) ** 2 - _cross(half, beside) ** 2)
-    x, y = (xa + xb) / 2, (ya + yb) / 2
-    h = fixed.h(x + width * beside[0] * _ALONG, y + width * beside[1] * _ALONG)
-    return bool((h >= 0).all())
-
-
-def blocks(zone: Sequence[float], goal: Point, settings: MPCSettings) -> bool:
-    """True if h < 0 at the `goal` by the `zone` of a person who stands, and these `settings`."""
-    if hypot(*zone[5:7]) >= STANDING_SPEED:
-        return False
-    distance = Zone.distance(*goal, 0.0, *zone)
-    return bool(barrier(distance, settings.r_robot, settings.eps) < 0)
-
-
-def _cross(u: tuple[float, float], v: tuple[float, float]) -> float:
-    return u[0] * v[1] - u[1] * v[0]
+def _find_h(zone: Sequence[float], point: Point, s: MPCSettings) -> float:
+    """h of a `zone` at a `point` [m]."""
+    return float(barrier(Zone.distance(*point, 0.0, *zone), s.r_robot, s.eps))
