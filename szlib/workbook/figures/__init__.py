@@ -25,7 +25,6 @@ from .comparisons import (
 )
 from .control import (
     plot_distance,
-    plot_distance_error,
     plot_step,
     plot_ways,
 )

@@ -1,4 +1,4 @@
-"""Figures of barriers and steps: a distance, its error, the scene of a step, and its ways."""
+"""Figures of barriers and steps: a distance, the scene of a step, and its ways."""
 
 from __future__ import annotations
 
@@ -22,11 +22,6 @@ from ...control.obstacles import (
     segment_distance,
 )
 from ...control.step import Step
-from ...control.verification import (
-    compute_distance_error,
-    find_safe_boundary,
-    required_margin,
-)
 from ...zones.ellipses import Ellipse
 from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from .style import add_legend_below, draw_person, get_axes, label_metres
@@ -99,66 +94,6 @@ def plot_distance(
     ax.plot([], [], color=RED, linewidth=2, label=f"h = 0, d = {margin:g} m")
     add_legend_below(ax)
     return label_metres(ax, f"Distance to {name} [m], and h = 0")
-
-
-def plot_distance_error(
-    shape: Ellipse | ArrayLike,
-    *,
-    r_robot: float,
-    eps: float,
-    extent: float = 2.0,
-    ax: Axes | None = None,
-) -> Axes:
-    """Plot the approximate minus the Euclidean distance near a zone or a wall, and h = 0 with two margins.
-
-    The robot's disc touches the zone or the wall on the dotted line.  A line h = 0 inside the dotted line
-    allows a collision.
-
-    Parameters
-    ----------
-    shape : ellipse, or the two ends of a wall [m].
-    r_robot : radius of the robot [m].
-    eps : margin [m]. The second margin is the least one without collisions.
-    extent : half the side of the figure [m].
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> from szlib.workbook import figures
-    >>> ax = figures.plot_distance_error([(-1.0, 0.0), (1.0, 0.0)], r_robot=0.5, eps=0.05)
-    """
-    ax = get_axes(ax, size=(5.5, 4.5))
-    grid = _grid(extent, 321)
-    x, y = np.moveaxis(grid, -1, 0)
-    error = compute_distance_error(grid, shape)
-    true = _distance(grid, shape) - error
-    # no error matters farther away
-    shown = np.ma.masked_where((true < 0) | (true > 0.9), 100 * error)
-    image = ax.pcolormesh(
-        x, y, shown, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True
-    )
-    ax.figure.colorbar(
-        image, ax=ax, shrink=0.85, label="d - Euclidean [cm]; red is dangerous"
-    )
-    ax.plot(*_outline(shape).T, color=BLACK, linewidth=3)
-    margins = dict.fromkeys((eps, max(eps, required_margin(shape, r_robot))))
-    for margin, line in zip(margins, ("-", "--"), strict=False):
-        edge = find_safe_boundary(shape, r_robot + margin)
-        label = f"h = 0, eps = {100 * margin:.0f} cm"
-        ax.plot(
-            *np.vstack([edge, edge[:1]]).T,
-            line,
-            color=BLACK,
-            linewidth=1.8,
-            label=label,
-        )
-    ax.contour(
-        x, y, true, levels=[r_robot], colors=[BLACK], linestyles=[":"], linewidths=1.8
-    )
-    ax.plot([], [], ":", color=BLACK, label="the robot's disc touches")
-    ax.set(xlim=(-extent, extent), ylim=(-extent, extent))
-    add_legend_below(ax)
-    return label_metres(ax, "Error of the approximate distance")
 
 
 def _grid(extent: float, n: int) -> Array:
