@@ -52,9 +52,9 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 from studies import feasibility, rollout_table
+from studies.distances import euclidean_to_segment
 
 import szlib
-from szlib.control import euclidean_to_segment
 from szlib.control.controller import advance
 from szlib.simulation.closed_loop import drive
 from szlib.workbook import figures

@@ -37,13 +37,17 @@ eccentricities = [0.0, 0.3, 0.5, 0.65, 0.8, 0.9, 0.99]  # of ellipses as long as
 
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
+import sys
+
+sys.path.append("..")  # for `studies`
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
+from studies import distances
 
 import szlib
-from szlib.control import Obstacle, verification
+from szlib.control import Obstacle, euclidean_to_ellipse
 from szlib.simulation.closed_loop import drive
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
@@ -65,10 +69,10 @@ parameters(
 zone = record.cache.ellipse()
 end, start = np.array([(0.5, 0.0), (-0.5, 0.0)])
 fig, sides = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-figures.plot_distance_error(zone, r_robot=r, eps=eps, extent=2.1, ax=sides[0])
+distances.plot_distance_error(zone, r_robot=r, eps=eps, extent=2.1, ax=sides[0])
 sides[0].set_title("Around a zone the distance d is never too long")
-figures.plot_distance_error([start, end], r_robot=r, eps=eps, extent=1.3, ax=sides[1])
-needed = verification.required_margin([start, end], r)
+distances.plot_distance_error([start, end], r_robot=r, eps=eps, extent=1.3, ax=sides[1])
+needed = distances.required_margin([start, end], r)
 sides[1].set_title(f"At the ends of a wall of 1 m it is {100 * needed:.0f} cm too long")
 record.figure(fig, "maps")
 
@@ -100,7 +104,7 @@ record.figure(fig, "maps")
 
 # %%
 points = np.random.default_rng(seed).uniform(-4, 4, (100_000, 2))
-exact = verification.euclidean_to_ellipse(points, zone)
+exact = euclidean_to_ellipse(points, zone)
 error = szlib.ellipse_distance(points, zone) - exact
 outside = 100 * error[exact > 0]
 print(
@@ -120,7 +124,7 @@ a = zone.semi_axes[0]
 rows = {}
 for e in eccentricities:
     like = szlib.Ellipse((0.0, 0.0), (a, a * np.sqrt(1 - e**2)))
-    rows[f"{e:g}"] = verification.compare_distances(like, r_robot=r, eps=eps)
+    rows[f"{e:g}"] = distances.compare_distances(like, r_robot=r, eps=eps)
 zones = (100 * pd.DataFrame(rows.values(), index=rows.keys())).rename_axis("eccentricity")
 zones.columns = ["smallest gap [cm]", "largest gap [cm]", "margin required [cm]"]
 zones.round(1)
@@ -136,7 +140,7 @@ zones.round(1)
 
 # %% jupyter={"source_hidden": true}
 # Checks
-learned = verification.compare_distances(zone, r_robot=r, eps=eps)
+learned = distances.compare_distances(zone, r_robot=r, eps=eps)
 beside = learned.farthest - eps
 record.claim(
     "eps covers the error around the learned zone",
@@ -161,7 +165,7 @@ print(f"Beside the learned zone the robot keeps {100 * beside:.1f} cm more than 
 # $s$ = 0.40 m: its disc is then 10 cm inside the wall.
 #
 # **Always.** At the true distance $s$ straight ahead of an end, $d = s + s^2/L$. The disc touches at $s = r$, and
-# nowhere else on the outline at distance $r$ is $d$ longer (proof in `szlib.control.verification`). So the margin must be
+# nowhere else on the outline at distance $r$ is $d$ longer (proof in `studies.distances`). So the margin must be
 #
 # $$\epsilon_{required} = \frac{r^2}{L},$$
 #
@@ -207,9 +211,7 @@ record.figure(fig, "margin")
 
 # %% jupyter={"source_hidden": true}
 # Table
-walls = {
-    length: verification.compare_distances([(0, 0), (length, 0)], r_robot=r, eps=eps) for length in lengths
-}
+walls = {length: distances.compare_distances([(0, 0), (length, 0)], r_robot=r, eps=eps) for length in lengths}
 names = [f"{length:g}" for length in walls]
 table = (100 * pd.DataFrame(walls.values(), index=names)).rename_axis("wall [m]")
 table.columns = ["smallest gap [cm]", "largest gap [cm]", "margin required [cm]"]
@@ -221,7 +223,7 @@ for length, found in walls.items():
     gap = f"{round(100 * found.nearest, 1) + 0.0} cm left"
     record.claim(f"eps covers the error of a wall of {length:g} m", found.nearest >= -1e-9, gap)
     enough = max(eps, found.required)
-    mended = verification.compare_distances([(0, 0), (length, 0)], r_robot=r, eps=enough)
+    mended = distances.compare_distances([(0, 0), (length, 0)], r_robot=r, eps=enough)
     claim = f"eps = {100 * enough:.1f} cm is enough for a wall of {length:g} m"
     gap = f"{round(100 * mended.nearest, 1) + 0.0} cm left"
     record.check(claim, mended.nearest >= -1e-9, gap, always=True)
@@ -244,7 +246,7 @@ log = drive(scenario, paper, until_arrival=False)
 
 careful = szlib.MPCCBF(zone, walls=wall, settings=settings)
 step = careful.step(start, goal)
-print(f"The margin that the wall requires: {verification.required_margin(wall[0], r):.2f} m")
+print(f"The margin that the wall requires: {distances.required_margin(wall[0], r):.2f} m")
 print(next(note for note in step.explain().splitlines() if "goal" in note).strip())
 
 # %% jupyter={"source_hidden": true}

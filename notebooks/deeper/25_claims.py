@@ -59,12 +59,12 @@ from studies import imposed as imposed_study
 from studies import paper_claims as claims
 from studies import plazas as plazas_study
 from studies import zones as zones_study
+from studies.distances import compare_distances
 from studies.folds import fold_table
 
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
 import szlib
-from szlib.control.verification import compare_distances
 from szlib.plaza.accuracy import true_kinds
 from szlib.workbook import figures, paper_sentences
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table

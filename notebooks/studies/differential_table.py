@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from studies.committed import write_table
+from studies.distances import euclidean_to_segment
 from studies.rollout_table import interval
 
 import szlib
@@ -22,7 +23,7 @@ from szlib.checks import Array
 from szlib.control.differential_drive import Unicycle
 from szlib.control.obstacles import ellipse_distance
 from szlib.control.settings import TOLERANCE
-from szlib.control.verification import euclidean_to_ellipse, euclidean_to_segment
+from szlib.control.verification import euclidean_to_ellipse
 from szlib.simulation.monte_carlo import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds

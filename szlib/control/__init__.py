@@ -3,7 +3,7 @@
 settings            every parameter of the controller: `MPCSettings`
 obstacles           what the robot keeps out of: distances, barriers, and the kinds `Zone`, `Body`, `Wall`,
                     `HalfPlane`, and those of users: `Obstacle`
-verification        Euclidean distances, and steps computed again by other formulas
+verification        steps computed again by other formulas: `Step.verify`
 walls               walls from lines, polygons and the maps of ROS: `walls_from_map`
 people              people as the controller sees them: `Person`, `Tracker`
 controller          the base class of controllers, the robots that they drive, and their clock
@@ -33,17 +33,7 @@ from .obstacles import (
 )
 from .people import Person, Prediction, TrackedPeople, Tracker, predict
 from .settings import MPCSettings
-from .step import (
-    STATUSES,
-    Scene,
-    Step,
-)
-from .verification import (
-    Report,
-    compare_distances,
-    euclidean_to_ellipse,
-    euclidean_to_segment,
-    required_margin,
-)
+from .step import STATUSES, Scene, Step
+from .verification import Report, euclidean_to_ellipse
 from .walls import read_walls, walls_from_grid, walls_from_map
 from .ways import Way

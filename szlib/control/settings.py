@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from itertools import accumulate
 from math import expm1, inf, log1p
@@ -15,30 +14,53 @@ import numpy as np
 from ..checks import check_array, check_number, require
 from ..errors import SolverError
 
-_require = partial(require, error=SolverError)
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest"]
-
-
-def _setting(badge: str, default: Any, **paper: Any) -> Any:
-    """A default and its source; `paper`: the value that the paper has instead."""
-    return field(default=default, metadata={"badge": badge, **paper})
-
-
-def _check_numbers(
-    settings: Any, expected: str, holds: Callable[[float], bool], *names: str
-) -> None:
-    """Make the settings of these names floats; SolverError unless each `holds` what is `expected`."""
-    for name in names:
-        object.__setattr__(
-            settings,
-            name,
-            value := float(check_array(name, getattr(settings, name), ())),
-        )
-        _require(holds(value), name, value, expected)
+_CHOICES = {"margin": Margin, "pass_side": Side, "solver": Solver, "terminal": Terminal}
+_COUNTS = "N", "N_h", "max_iterations"
+_LIMITS = "lookahead", "decay_price", "zone_price", "time_limit", "deadline"
+# Ranges of numbers: as a check, in words, and the settings that must lie in it.
+_RANGES = (
+    (
+        lambda v: v > 0,
+        "positive",
+        ("dt", "R", "a_max", "v_max", "zone_speed", *_LIMITS),
+    ),
+    (
+        lambda v: v >= 0,
+        "at least 0",
+        ("Q", "P", "jerk_weight", "r_robot", "eps", "body_gap"),
+    ),
+    (lambda v: (v > 0) & (v <= 1), "in (0, 1]", ("gamma",)),
+    (lambda v: (v >= 0) & (v <= 0.5), "in [0, 0.5]", ("head_on_share",)),
+)
+# What the paper has instead of the default, and the sources of the defaults that are not the paper's.
+_PAPER = {
+    "margin": "paper",
+    "head_on_share": 0.0,
+    "guard": False,
+    "solver": "ipopt",
+    "time_limit": inf,
+}
+_SOURCES = {
+    "gamma": "tuned",
+    "Q": "assumed",
+    "R": "assumed",
+    "P": "assumed",
+    "a_max": "assumed",
+    "margin": "measured",
+    "pass_side": "assumed",
+    "head_on_share": "assumed",
+    "body_gap": "assumed",
+    "guard": "measured",
+    "solver": "measured",
+    "max_iterations": "assumed",
+    "time_limit": "assumed",
+    "deadline": "assumed",
+}
 
 
 @dataclass(frozen=True)
@@ -106,101 +128,63 @@ class MPCSettings:
     ('paper', 'chosen')
     """
 
-    dt: float = _setting("paper", 0.1)
-    N: int = _setting("paper", 8)
-    N_h: int = _setting("paper", 2)
-    grid: tuple[int, ...] = _setting("paper", ())
-    gamma: float = _setting("tuned", 0.05)
-    Q: tuple[float, float, float, float] = _setting("assumed", (10.0, 10.0, 1.0, 1.0))
-    R: tuple[float, float] = _setting("assumed", (1.0, 1.0))
-    P: tuple[float, float, float, float] = _setting(
-        "assumed", (100.0, 100.0, 10.0, 10.0)
-    )
-    jerk_weight: float = _setting("paper", 0.0)
-    a_max: float = _setting("assumed", 1.0)
-    v_max: float = _setting("paper", 1.0)
-    lookahead: float = _setting("paper", np.inf)
-    r_robot: float = _setting("paper", 0.5)
-    eps: float = _setting("paper", 0.05)
-    margin: Margin = _setting("measured", "euclidean", paper="paper")  # noqa: RUF009
-    zone_speed: float = _setting("paper", 1.1)
-    pass_side: Side = _setting("assumed", "right")  # noqa: RUF009
-    head_on_share: float = _setting("assumed", 0.25, paper=0.0)
-    terminal: Terminal = _setting("paper", "none")  # noqa: RUF009
-    decay_price: float = _setting("paper", np.inf)
-    zone_price: float = _setting("paper", np.inf)
-    body_gap: float = _setting("assumed", 0.0)
-    guard: bool = _setting("measured", True, paper=False)
-    solver: Solver = _setting("measured", "sqp", paper="ipopt")  # noqa: RUF009
-    max_iterations: int = _setting("assumed", 100)
-    time_limit: float = _setting("assumed", 0.05, paper=np.inf)
-    deadline: float = _setting("assumed", np.inf)
+    dt: float = 0.1
+    N: int = 8
+    N_h: int = 2
+    grid: tuple[int, ...] = ()
+    gamma: float = 0.05
+    Q: tuple[float, float, float, float] = (10.0, 10.0, 1.0, 1.0)
+    R: tuple[float, float] = (1.0, 1.0)
+    P: tuple[float, float, float, float] = (100.0, 100.0, 10.0, 10.0)
+    jerk_weight: float = 0.0
+    a_max: float = 1.0
+    v_max: float = 1.0
+    lookahead: float = inf
+    r_robot: float = 0.5
+    eps: float = 0.05
+    margin: Margin = "euclidean"
+    zone_speed: float = 1.1
+    pass_side: Side = "right"
+    head_on_share: float = 0.25
+    terminal: Terminal = "none"
+    decay_price: float = inf
+    zone_price: float = inf
+    body_gap: float = 0.0
+    guard: bool = True
+    solver: Solver = "sqp"
+    max_iterations: int = 100
+    time_limit: float = 0.05
+    deadline: float = inf
 
     def __post_init__(self) -> None:
-        for name, length in (("Q", 4), ("R", 2), ("P", 4)):
-            weights = check_array(name, getattr(self, name), (length,))
-            object.__setattr__(self, name, tuple(weights.tolist()))
-        object.__setattr__(
-            self, "grid", grid := tuple(operator.index(length) for length in self.grid)
-        )
-        if grid:
-            is_grid = grid[0] == 1 and min(grid) >= 1 and self.terminal == "none"
-            _require(
-                is_grid,
-                "grid",
-                grid,
-                "whole numbers >= 1, the first 1, and no terminal condition",
-            )
-            object.__setattr__(self, "N", len(grid))
-            object.__setattr__(self, "N_h", len(grid))
-        for name in ("N", "N_h", "max_iterations"):
+        put = partial(object.__setattr__, self)
+        for holds, expected, names in _RANGES:
+            for name in names:
+                value, shape = getattr(self, name), np.shape(getattr(MPCSettings, name))
+                if name in _LIMITS and value == inf:
+                    continue
+                numbers = check_array(name, value, shape)
+                require(holds(numbers).all(), name, value, expected, SolverError)
+                put(name, tuple(numbers.tolist()) if shape else float(numbers))
+        for name in _COUNTS:
             value = getattr(self, name)
-            _require(
-                isinstance(value, int | np.integer) and value >= 1,
-                name,
-                value,
-                "a whole number >= 1",
-            )
-        positive = "dt", "a_max", "v_max", "zone_speed"
-        _check_numbers(self, "a positive number", lambda v: v > 0, *positive)
-        _check_numbers(
-            self,
-            "a number >= 0",
-            lambda v: v >= 0,
-            "r_robot",
-            "eps",
-            "jerk_weight",
-            "body_gap",
+            is_count = isinstance(value, int | np.integer) and value >= 1
+            require(is_count, name, value, "a whole number >= 1", SolverError)
+        for name, choice in _CHOICES.items():
+            value, allowed = getattr(self, name), get_args(choice)
+            expected = " or ".join(map(repr, allowed))
+            require(value in allowed, name, value, expected, SolverError)
+        put("grid", grid := tuple(map(operator.index, self.grid)))
+        if grid:
+            is_grid = grid[0] == 1 == min(grid) and self.terminal == "none"
+            expected = "whole numbers >= 1, the first 1, and no terminal condition"
+            require(is_grid, "grid", grid, expected, SolverError)
+            put("N", len(grid))
+        if grid or self.terminal != "none":
+            put("N_h", self.N)
+        require(
+            self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}", SolverError
         )
-        _check_numbers(self, "in (0, 1]", lambda v: 0 < v <= 1, "gamma")
-        _check_numbers(self, "in [0, 0.5]", lambda v: 0 <= v <= 0.5, "head_on_share")
-        _require(self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}")
-        _require(min(self.Q) >= 0, "Q", self.Q, "weights >= 0")
-        _require(min(self.P) >= 0, "P", self.P, "weights >= 0")
-        _require(min(self.R) > 0, "R", self.R, "weights > 0")
-        choices = {
-            "margin": Margin,
-            "pass_side": Side,
-            "terminal": Terminal,
-            "solver": Solver,
-        }
-        for name, literal in choices.items():
-            given, allowed = getattr(self, name), get_args(literal)
-            _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
-        for name, unit in (
-            ("time_limit", "seconds"),
-            ("deadline", "seconds"),
-            ("lookahead", "metres"),
-            ("decay_price", "cost"),
-            ("zone_price", "cost"),
-        ):
-            is_positive = (
-                isinstance(value := getattr(self, name), int | float | np.number)
-                and value > 0
-            )
-            _require(is_positive, name, value, f"a positive number of {unit}, or inf")
-        if self.terminal != "none":
-            object.__setattr__(self, "N_h", self.N)
 
     @classmethod
     def paper(cls, **changes: Any) -> MPCSettings:
@@ -216,10 +200,7 @@ class MPCSettings:
         >>> szlib.MPCSettings.paper(gamma=0.1).solver
         'ipopt'
         """
-        differing = {
-            f.name: f.metadata["paper"] for f in fields(cls) if "paper" in f.metadata
-        }
-        return cls(**{**differing, **changes})
+        return cls(**_PAPER | changes)
 
     @property
     def gamma_rate(self) -> float:
@@ -256,10 +237,17 @@ class MPCSettings:
         """
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
         reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
-        own = {"gamma": 0.2, "grid": grid, "jerk_weight": 6.0, "lookahead": reach + 1.0}
-        own |= {"decay_price": 10.0, "zone_price": 400.0, "body_gap": 0.2}
-        own |= {"max_iterations": 8}
-        return cls(**{**own, **changes})
+        own = {
+            "gamma": 0.2,
+            "grid": grid,
+            "jerk_weight": 6.0,
+            "lookahead": reach + 1.0,
+            "decay_price": 10.0,
+            "zone_price": 400.0,
+            "body_gap": 0.2,
+            "max_iterations": 8,
+        }
+        return cls(**own | changes)
 
     @cached_property
     def step_lengths(self) -> tuple[int, ...]:
@@ -276,12 +264,11 @@ class MPCSettings:
 
         "paper", "assumed", "measured", "tuned" (on the paper's four scenarios), or "chosen" by the user.
         """
-        badges = {}
-        for each in fields(self):
-            value = getattr(self, each.name)
-            badges[each.name] = (
-                each.metadata["badge"] if value == each.default else "chosen"
-            )
-            if value == each.metadata.get("paper", object()):
-                badges[each.name] = "paper"
-        return badges
+        return {each.name: self._find_source(each.name) for each in fields(self)}
+
+    def _find_source(self, name: str) -> str:
+        value = getattr(self, name)
+        if value == _PAPER.get(name):
+            return "paper"
+        is_default = value == getattr(MPCSettings, name)
+        return _SOURCES.get(name, "paper") if is_default else "chosen"

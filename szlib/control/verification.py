@@ -1,27 +1,5 @@
-"""Other formulas for the same: Euclidean distances, and steps computed again.
+"""Steps computed again by other formulas, and the Euclidean distance to a zone.
 
-The paper's distances compared with Euclidean ones, and the margin that makes them safe
-----------------------------------------------------------------------------------------
-A robot of radius r must stay r away from a wall or a zone, in Euclidean distance e. The barrier keeps
-d >= r + eps instead, so eps is large enough where {e < r} lies inside {d < r + eps}:
-
-    required margin = max of d over {e <= r}, less r
-
-*Ellipse*: none. With p the nearest point on the ellipse, |x-c| <= |x-p| + |p-c| for both foci, so
-d(x) <= e(x) + d(p) = e(x): the focal distance never over-estimates, for any eccentricity. Inside, the
-same with x and p exchanged gives |d| <= |e|.
-
-*Wall* of length L: r^2/L. Let the point at distance r from an end lie at the angle phi off the wall's
-line. Its trimming term is r cos phi + r^2/L, so d^2 = r^2 + 2 (r^3/L) cos phi + r^4/L^2, which is
-greatest straight ahead of the end: d = r + r^2/L. A point beside the wall, u <= L/2 from the end, has
-the term (r^2 - u (L-u))/L at most, and is exact where that is negative.
-
-So the controller gives each wall the margin it requires (`Wall.margin`). This costs at most 0.42 r of space,
-beside a wall of L = 2 r. Around a pillar, L -> 0, {d < r + r^2/L} becomes the disc of radius r, and it costs
-nothing.
-
-Steps computed again
---------------------
 `verify_step` uses formulas written anew from the paper, NumPy only, without the problem's code: distances,
 barriers, rows, motion, bounds and overlaps are computed from the question (`Scene`) and the plan alone, and
 compared with what the step claims. Kinds of obstacles that are not of szlib are measured by their own
@@ -31,7 +9,7 @@ formula.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,31 +18,10 @@ from numpy.typing import ArrayLike
 
 from ..checks import Array, check_array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .obstacles import (
-    Wall,
-    Zone,
-    check_wall,
-    ellipse_distance,
-    euclidean_segment_formula,
-    segment_distance,
-)
+from .obstacles import Wall, Zone
 from .settings import TOLERANCE
 
 _BISECTIONS = 60  # halvings of a quarter turn that reach double precision
-
-
-def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
-    """Euclidean distance of `points`, shape (..., 2), to the segment from `a` to `b`, shape (...) [m].
-
-    Examples
-    --------
-    >>> from szlib.control import euclidean_to_segment
-    >>> euclidean_to_segment([(0.0, 0.5), (2.0, 0.0)], (-1.0, 0.0), (1.0, 0.0)).tolist()
-    [0.5, 1.0]
-    """
-    xy = check_array("points", points, (..., 2))
-    (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
-    return np.asarray(euclidean_segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
 
 
 def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
@@ -110,116 +67,6 @@ def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
     return np.asarray(
         np.hypot(p - a * np.cos(low), q - b * np.sin(low)) * np.where(inside, -1, 1)
     )
-
-
-def required_margin(of: Ellipse | ArrayLike, r_robot: float) -> float:
-    """The smallest eps with which a robot never touches a zone or a wall [m].
-
-    It is 0 for an ellipse, and r_robot^2 / L for a wall of length L; see the proof at the top of this module.
-
-    Parameters
-    ----------
-    of : an ellipse, or the end points of a wall, shape (2, 2) [m].
-    r_robot : radius of the robot [m].
-
-    Examples
-    --------
-    >>> from szlib.control import required_margin
-    >>> required_margin([(0.0, 0.0), (1.0, 0.0)], r_robot=0.5)
-    0.25
-    """
-    if isinstance(of, Ellipse):
-        return 0.0
-    start, end = check_wall(of)
-    return float(r_robot**2 / np.hypot(*(end - start)))
-
-
-@dataclass(frozen=True)
-class DistanceComparison:
-    """The error of the approximate distance on the line h = 0.
-
-    Attributes
-    ----------
-    nearest, farthest : smallest and largest Euclidean gap between the robot's disc and the zone or wall [m].
-        `nearest` below 0 is a collision that the barrier calls safe; `farthest` above eps is wasted space.
-    required : the margin with which `nearest` is 0 [m]; see `required_margin`.
-    """
-
-    nearest: float
-    farthest: float
-    required: float
-
-
-def compare_distances(
-    of: Ellipse | ArrayLike, *, r_robot: float, eps: float, n: int = 2001
-) -> DistanceComparison:
-    """Compare the approximate with the Euclidean distance on the line h = 0.
-
-    Parameters
-    ----------
-    of : an ellipse, or the end points of a wall, shape (2, 2) [m].
-    r_robot : radius of the robot [m].
-    eps : margin [m].
-    n : number of points on each arc.
-
-    Examples
-    --------
-    >>> from szlib.control import compare_distances
-    >>> round(compare_distances([(0.0, 0.0), (1.0, 0.0)], r_robot=0.5, eps=0.05).nearest, 2)  # they overlap
-    -0.11
-    """
-    points = find_safe_boundary(of, r_robot + eps, n)
-    # the approximate distance is r_robot + eps
-    gap = eps - compute_distance_error(points, of)
-    return DistanceComparison(
-        float(gap.min()), float(gap.max()), required_margin(of, r_robot)
-    )
-
-
-def find_safe_boundary(
-    of: Ellipse | ArrayLike, distance: float, n: int = 2001
-) -> Array:
-    """Find points where the approximate distance is `distance` > 0, shape (m, 2) [m].
-
-    Parameters
-    ----------
-    of : an ellipse, or the end points of a wall, shape (2, 2) [m].
-    distance : approximate distance of the points [m].
-    n : number of points on each arc.
-
-    Notes
-    -----
-    Around a zone it is the confocal ellipse of semi-major axis a + distance. Around a wall, in its own frame,
-    y = distance sin psi and x^2 = L^2/4 + L distance cos psi - y^2, for each end and side.
-    """
-    if isinstance(of, Ellipse):
-        (a, b), reach = of.semi_axes, of.semi_axes[0] + distance
-        # a circle stays one, without rounding
-        across = min(reach, float(np.sqrt(reach**2 - a**2 + b**2)))
-        return replace(of, semi_axes=(reach, across), support=None).curve(n)
-    start, end = check_wall(of)
-    length, psi = float(np.hypot(*(end - start))), np.linspace(0, np.pi / 2, n)
-    along = (end - start) / length
-    y = distance * np.sin(psi)
-    squared = length**2 / 4 + length * distance * np.cos(psi) - y**2
-    x, y = np.sqrt(squared[squared >= 0]), y[squared >= 0]
-    quarters = np.array(
-        [(sx * x, sy * y) for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-    )
-    local = np.concatenate(
-        [q.T if i % 2 == 0 else q.T[::-1] for i, q in enumerate(quarters)]
-    )
-    return np.asarray(
-        (start + end) / 2 + local @ np.array([along, [-along[1], along[0]]])
-    )
-
-
-def compute_distance_error(points: ArrayLike, of: Ellipse | ArrayLike) -> Array:
-    """Approximate minus Euclidean distance of `points` (..., 2) to `of` [m]: dangerous if positive."""
-    if isinstance(of, Ellipse):
-        return ellipse_distance(points, of) - euclidean_to_ellipse(points, of)
-    ends = check_wall(of)
-    return segment_distance(points, *ends) - euclidean_to_segment(points, *ends)
 
 
 # Two computations of one number may differ by this much, relative to the largest number (at least 1).

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from studies.distances import euclidean_to_segment
 
 import szlib
 from szlib.checks import Array
-from szlib.control import HalfPlane, Obstacles, Wall, advance, euclidean_to_segment, mpc
+from szlib.control import HalfPlane, Obstacles, Wall, advance, mpc
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 S = szlib.MPCSettings(time_limit=np.inf)

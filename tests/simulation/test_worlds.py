@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from studies.distances import euclidean_to_segment
 
 import szlib
-from szlib.control.verification import euclidean_to_segment
 from szlib.simulation.scenario import Behaviour
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 

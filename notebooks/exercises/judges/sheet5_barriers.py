@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from szlib.control.obstacles import barrier, cbf_residual, ellipse_distance, segment_distance
-from szlib.control.verification import euclidean_to_segment, required_margin
+from szlib.control.obstacles import Wall, barrier, cbf_residual, ellipse_distance, segment_distance
 from szlib.zones.ellipses import Ellipse
 
 from .task import Args, Rng, make_task, repeat
@@ -45,6 +44,10 @@ def _g_and_t(points: Any, a: Any, b: Any) -> tuple[Any, Any]:
     return g, ((length / 2) ** 2 - ((points - (a + b) / 2) ** 2).sum(axis=1)) / length
 
 
+def _euclidean(points: Any, a: Any, b: Any) -> Any:
+    return Wall.gap(*points.T, 0.0, *a, *b)
+
+
 def _trimmed(g: Any, t: Any, side: int = -1) -> Any:
     return np.sqrt(g**2 + ((np.abs(t) + side * t) / 2) ** 2)
 
@@ -76,6 +79,6 @@ TASKS = (
         globals(),
         "end_margin",
         repeat(_draw_robot_and_wall),
-        solution=lambda radius, length: required_margin([(0, 0), (length, 0)], radius),
+        solution=lambda radius, length: radius**2 / length,
     ),
 )

@@ -14,7 +14,6 @@ from ...checks import Array, require
 from ...control.obstacles import Obstacles, Wall, Zone, euclidean_segment_formula
 from ...control.people import Person
 from ...control.settings import MPCSettings
-from ...control.verification import required_margin
 from ...errors import SolverError
 from ...zones.ellipses import BODY_RADIUS, Ellipse
 from ..scenario import Scenario
@@ -115,9 +114,8 @@ class Worlds:
             velocity = speed * np.array([cos(heading), sin(heading)])
             if not self.travel[0] <= np.hypot(*(goal - x)) <= self.travel[1]:
                 continue
-            eps = max(
-                [_ROBOT.eps, *(required_margin(wall, _ROBOT.r_robot) for wall in walls)]
-            )
+            margins = (Wall(*wall.ravel()).margin(_ROBOT) for wall in walls)
+            eps = max(margins, default=_ROBOT.eps)
             placed = [_place(person, zone) for person in people]
             standing = [
                 each
