@@ -68,7 +68,7 @@ _TURNS = np.array(sorted(np.linspace(-pi, pi, 33), key=abs))
 # largest turn that is asked for at once, and where a turn ends [rad]
 _TURN, _ALIGNED = (1.0, 0.2)
 _FREE = 0.02  # h that the point needs [m]
-_SAMPLES = 17  # points of an arc at which a step is verified
+_SHARES = np.linspace(0.0, 1.0, 17)[1:]  # points of an arc at which a step is verified
 
 
 @dataclass(frozen=True)
@@ -183,13 +183,10 @@ class DriveStep:
 
     def verify(self) -> Report:
         """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
-        found, dt = (
-            verify_step(self.point, self._carry, self.spare),
-            self.point.scene.settings.dt,
-        )
-        path = self._drive(self.own[:3], self.control, dt)
-        differs = np.abs(path[[0, -1]] - self.predicted[:2, :2]).max()
-        if differs <= ROUNDING * max(1.0, float(np.abs(path).max())):
+        found = verify_step(self.point, self._carry, self.spare)
+        end = self._drive(self.own, self.control, self.point.scene.settings.dt)[-1]
+        differs = np.abs(end - self.predicted[1, :2]).max()
+        if differs <= ROUNDING * max(1.0, np.abs(end).max()):
             return found
         fault = f"motion of the disc differs by {differs:.2g}"
         return replace(found, faults=(*found.faults, fault))
@@ -199,20 +196,19 @@ class DriveStep:
         own, lasts, found = self.own, np.diff(times), [self.own[None, :2]]
         _, commands = self.wheels.follow(own, points[1:], lasts.tolist())
         for command, last in zip(commands, lasts, strict=True):
-            found.append(self._drive(own, command, last)[1:])
+            found.append(self._drive(own, command, last))
             own = self.wheels.robot.advance(own, command, last)
-        shares = np.linspace(0.0, 1.0, _SAMPLES)[1:]
-        within = (times[:-1, None] + lasts[:, None] * shares).ravel()
-        return np.concatenate(found), np.concatenate([times[:1], within])
+        within = times[:-1, None] + lasts[:, None] * _SHARES
+        return np.concatenate(found), np.r_[times[0], within.ravel()]
 
     @staticmethod
     def _drive(own: Array, control: Array, dt: float) -> Array:
         """Points of the arc on which the disc drives from `own` for `dt` [s], shape (n, 2) [m]."""
-        x, y, theta, *_ = own
-        v, omega = control
-        turned = 1j * (omega or 1e-9) * np.linspace(0.0, dt, _SAMPLES)
-        way = v * np.exp(1j * theta) * np.expm1(turned) / turned[-1] * dt
-        return np.column_stack([x + way.real, y + way.imag])
+        turned = 1j * (control[1] or 1e-9) * dt
+        way = (
+            control[0] * dt * np.exp(1j * own[2]) / turned * np.expm1(turned * _SHARES)
+        )
+        return np.column_stack([own[0] + way.real, own[1] + way.imag])
 
     def __repr__(self) -> str:
         (v, omega), safe = self.control.tolist(), "safe" if self.safe else "not safe"

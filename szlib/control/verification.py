@@ -8,7 +8,7 @@ formula.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -131,80 +131,97 @@ def verify_step(step: Any, carry: Carry | None = None, spare: float = 0.0) -> Re
         see `_check_guard`.
     """
     scene, s, x = step.scene, step.scene.settings, np.asarray(step.predicted, float)
-    times = s.dt * np.cumsum([0, *(s.grid or [1] * s.N)])
-    moved = _follow(np.array(scene.state), step.inputs, np.diff(times))
+    lasts = s.dt * np.array(s.grid or [1] * s.N)
+    ways = _sample(np.array(scene.state), zip(step.inputs, lasts, strict=True))
+    path, times = ways.points[:_SAMPLES], np.r_[0.0, np.cumsum(lasts)]
     h = _measure(scene, x[:, :2], times, is_barrier=True)
-    residual = h[:, 1:] - (1 - s.gamma) ** (np.diff(times) / s.dt) * h[:, :-1]
+    residual = h[:, 1:] - (1 - s.gamma) ** (lasts / s.dt) * h[:, :-1]
     worst = min(_list_rows(scene, x, h, residual), key=lambda row: row.value)
-    slack = max(0.0, -worst.value)
-    feasible = slack <= TOLERANCE
-    path = _sample(x[0], step.control, s.dt)
-    gap, least = _find_gap(scene, path), float(h[:, :2].min(initial=np.inf))
-    lowest = min(gap, least)
+    slack, least = max(0.0, -worst.value), float(h[:, :2].min(initial=np.inf))
+    gap = _find_gap(scene, path, ways.times[:_SAMPLES])
+    feasible, lowest = slack <= TOLERANCE, min(gap, least)
     safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
     compared = {
-        "motion": (moved, x),
+        "motion": (ways.states, x),
         "control": (step.control, step.inputs[0]),
         "h": (h[:, 0], step.h[scene.rows]),
         "residual": (residual[:, : s.N_h], step.residual[scene.rows]),
         "slack": (slack, step.slack),
     }
     tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
+    errors = {
+        name: np.abs(np.subtract(*each)).max(initial=0.0)
+        for name, each in compared.items()
+    }
     faults = [
-        f"{name} differs by {np.abs(found - claimed).max():.2g}"
-        for name, (found, claimed) in compared.items()
-        if not np.abs(found - claimed).max(initial=0.0) <= tolerance
+        f"{name} differs by {error:.2g}"
+        for name, error in errors.items()
+        if not error <= tolerance
     ]
     beyond = np.abs(step.inputs).max() - s.a_max
     if not beyond <= tolerance / s.dt:
         faults.append(f"an acceleration is {beyond:.2g} m/s2 beyond its bound")
     undecided = min(abs(slack - TOLERANCE), abs(lowest + TOLERANCE)) <= tolerance
     # the bound of a step may be loose where somebody or the robot is fast
-    fastest = max([float(np.hypot(*each.velocity)) for each in scene.people], default=0)
+    fastest = max([np.hypot(*each.velocity) for each in scene.people], default=0.0)
     reach = s.dt * fastest + 2 * np.abs(path - path[0]).sum(axis=1).max()
     undecided |= not step.safe and lowest <= reach
     if not undecided and (feasible, safe) != (step.feasible, step.safe):
         faults.append(
             f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
         )
-    faults += _check_guard(step, x, np.diff(times), carry, spare)
+    faults += _check_guard(step, lasts, carry, spare)
     return Report(tuple(faults), worst, slack, least, gap, feasible, safe)
 
 
-def _follow(state: Array, inputs: Array, lasts: Array) -> Array:
-    """States of a double integrator that holds each input, shape (k, 2), for its time (paper, eq. 8)."""
-    found = [state]
-    for u, dt in zip(inputs, lasts, strict=True):
-        (x, y, vx, vy), half = found[-1], dt / 2 * u
-        p = np.array([x, y]) + dt * (np.array([vx, vy]) + half)
-        found.append(np.r_[p, (vx, vy) + 2 * half])
-    return np.array(found)
+class _Way(NamedTuple):
+    """Points of a way and their times, `_SAMPLES` for each input, and the states between two inputs."""
+
+    points: Array
+    times: Array
+    states: Array
 
 
-def _sample(state: Array, control: Array, dt: float) -> Array:
-    """Points of a way on which a control is held for `dt`, shape (`_SAMPLES`, 2) [m]."""
-    t = np.linspace(0.0, dt, _SAMPLES)[:, None]
-    return np.asarray(state[:2] + t * state[2:] + t**2 / 2 * control)
+def _sample(
+    state: Array, pieces: Iterable[tuple[Array, float]], rests_by: Any = None
+) -> _Way:
+    """The way of a double integrator that holds each input for its time (paper, eq. 8).
+
+    Then it brakes as hard as it can, with the settings `rests_by`.
+    """
+    points, times, states, todo = [state[None, :2]], [np.zeros(1)], [state], [*pieces]
+    s, shares = rests_by, np.linspace(0.0, 1.0, _SAMPLES)[1:]
+    while todo or (s and np.abs(states[-1][2:]).max() > 1e-9):
+        p, v = np.split(states[-1], 2)
+        if not todo:
+            stop = np.abs(v).max() / s.a_max
+            piece = s.dt * max(1.0, np.ceil(stop / s.dt / _SAMPLES))
+            todo.append((-v / max(piece, stop), piece))
+        u, dt = todo.pop(0)
+        t = dt * shares[:, None]
+        points.append(p + t * v + t**2 / 2 * u)
+        times.append(times[-1][-1] + t[:, 0])
+        states.append(np.r_[points[-1][-1], v + dt * u])
+    return _Way(np.concatenate(points), np.concatenate(times), np.array(states))
 
 
 def _check_guard(
-    step: Any, x: Array, lasts: Array, carry: Carry | None, spare: float
+    step: Any, lasts: Array, carry: Carry | None, spare: float
 ) -> Iterator[str]:
     """What is wrong with `walls_safe` and `passively_safe` of a `step`, by many points of both ways.
 
     Parameters
     ----------
-    step : a `Step`, with its plan's states `x`, and the times `lasts` between them.
+    step : a `Step`, with the times `lasts` of its inputs.
     carry : the way of the disc from that of the point which is planned for; None: it is the same.
     spare : by which the disc is smaller than that of the scene [m].
     """
-    scene, s = step.scene, step.scene.settings
+    scene, s, is_clear = step.scene, step.scene.settings, list[bool]()
     is_fixed = np.array([each.is_fixed for each in scene.barriers.items], bool)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
-    is_clear = list[bool]()
     for n in (1, s.N):
-        inputs = np.vstack([step.control, step.inputs[1:]])[:n]
-        points, times = _sample_until_rest(x[0], inputs, lasts[:n], s)
+        inputs = zip([step.control, *step.inputs[1:n]], lasts, strict=False)
+        points, times, _ = _sample(np.array(scene.state), inputs, s)
         if carry:
             points, times = carry(points[:: _SAMPLES - 1], times[:: _SAMPLES - 1])
         gaps = spare + _measure(scene, points, times, as_predicted=False)
@@ -221,33 +238,14 @@ def _check_guard(
         yield "the step says that it rests before somebody walks into it; it does not"
 
 
-def _sample_until_rest(
-    state: Array, inputs: Array, lasts: Array, s: Any
-) -> tuple[Array, Array]:
-    """Points of a way, and their times: each input is held for its time, then the robot brakes."""
-    points, times = [state[None, :2]], [np.zeros(1)]
-    todo = list(zip(inputs, lasts, strict=True))
-    while todo or np.abs(state[2:]).max() > 1e-9:
-        if not todo:
-            stop = np.abs(state[2:]).max() / s.a_max
-            piece = s.dt * max(1.0, np.ceil(stop / s.dt / _SAMPLES))
-            todo.append((-state[2:] / max(piece, stop), piece))
-        control, dt = todo.pop(0)
-        points.append(_sample(state, control, dt)[1:])
-        times.append(times[-1][-1] + np.linspace(0.0, dt, _SAMPLES)[1:])
-        state = np.r_[points[-1][-1], state[2:] + dt * control]
-    return np.concatenate(points), np.concatenate(times)
-
-
-def _find_gap(scene: Any, path: Array) -> float:
+def _find_gap(scene: Any, path: Array, times: Array) -> float:
     """Smallest gap on the `path` of a step, shape (n, 2), as of `Report.gap` [m]; -inf in a solid wall."""
-    solids, eps = scene.solids, scene.settings.eps
+    solids = scene.solids
     if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
         return -np.inf
-    times = np.linspace(0.0, scene.settings.dt, len(path))
     h = _measure(scene, path, times, is_barrier=True)[: len(scene.people)]
-    gaps = _measure(scene, path, times)
-    return float(min(gaps.min(initial=np.inf), (h + eps).min(initial=np.inf)))
+    gaps = [*_measure(scene, path, times), *(h + scene.settings.eps)]
+    return float(np.min(gaps, initial=np.inf))
 
 
 def _list_rows(scene: Any, x: Array, h: Array, residual: Array) -> Iterator[Row]:
