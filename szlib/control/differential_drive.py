@@ -46,7 +46,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, replace
 from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -228,8 +228,8 @@ class DifferentialDrive(MPCCBF):
     Parameters
     ----------
     zone, walls, obstacles, tracker : as of `MPCCBF`.
-    settings : of the robot, an attribute as well: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
-        `a_max` bounds the acceleration of the point ahead of the axle.
+    settings : of the robot: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
+        `a_max` bounds the acceleration of the point ahead of the axle. An attribute as well.
     omega_max : limit of |omega| [rad/s]; default: that of a common indoor robot whose wheels reach 1 m/s
         (assumed).
     ahead : distance of the point from the axle [m]; default: the smallest one with which `settings.v_max` can
@@ -309,7 +309,7 @@ class DifferentialDrive(MPCCBF):
         self._seen: Scene | None = None
         self._planned_velocity = [0.0, 0.0]
 
-    def step(
+    def step(  # type: ignore[override]
         self,
         state: ArrayLike,
         goal: ArrayLike,
@@ -335,10 +335,11 @@ class DifferentialDrive(MPCCBF):
         ------
         SolverError : as of `MPCCBF.step`.
         """
-        more = {"ids": ids, "stamps": stamps, "now": now}
-        return super().step(
+        more: Any = {"ids": ids, "stamps": stamps, "now": now}
+        found: Any = super().step(
             state, goal, people, route=route, state_age=state_age, **more
         )
+        return cast(DriveStep, found)
 
     def _locate(
         self, state: ArrayLike, goal: Point, age: float

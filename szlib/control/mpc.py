@@ -58,6 +58,7 @@ from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .controller import Controller, StepClock, find_stopping_path
 from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone
 from .people import (
+    STANDING_SPEED,
     People,
     Person,
     SpeedZone,
@@ -231,7 +232,7 @@ class MPCCBF(Controller):
         now: float | None = None,
         route: ArrayLike | None = None,
         state_age: float = 0.0,
-    ) -> Any:
+    ) -> Step:
         """Decide the acceleration for the next `dt`.
 
         The robot always gets a control, whatever people do and whatever a sensor measures. `Step.status`
@@ -302,7 +303,8 @@ class MPCCBF(Controller):
             stuck=clock.time_without_progress(remaining, towards),
             clock=clock.describe(stamps, self.tracker.memory),
         )
-        return self._finish(step)
+        found: Step = self._finish(step)
+        return found
 
     def _locate(
         self, state: ArrayLike, goal: Point, age: float
@@ -370,7 +372,7 @@ class MPCCBF(Controller):
         braking = plan_braking(s, state[2:])[0]
         rest = self._foresee(bodies, find_stopping_path(state, braking, s))
         seen = attrgetter("body_seen" if walls_safe else "wall_seen")
-        brakes = seen(rest) >= min(-TOLERANCE, seen(after))
+        brakes = bool(seen(rest) >= min(-TOLERANCE, seen(after)))
         return (rest if brakes else after), brakes
 
     def _is_clear(self, scene: Scene, control: Array) -> bool:
@@ -391,7 +393,7 @@ class MPCCBF(Controller):
         if room - dist(at, (x, y)) < reach:
             room = float(self._walls_near.gaps(x, y).min(initial=inf))
             self._room = at, room = (x, y), room
-        return room - dist(at, (x, y)) >= reach
+        return bool(room - dist(at, (x, y)) >= reach)
 
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
@@ -412,7 +414,7 @@ class MPCCBF(Controller):
         path = self._carry(path)
         begin, spare = path.points[0], self._spare
         wall, wall_seen = self._walls_near.bound(path, are_fixed=True)
-        of_bodies = bodies.bound(path)
+        of_bodies: Any = bodies.bound(path)
         if np.ptp(path.points, axis=0).max() <= AT_REST * self._s.dt:
             of_bodies = np.zeros((2, 0)), np.zeros(0)
         elif bodies.size:
@@ -420,7 +422,7 @@ class MPCCBF(Controller):
             towards = ((places - begin) @ (path.points - begin).T).max(axis=1)
             overlaps = bodies.gaps(*begin) + spare < 0.0
             parting = np.where(towards > 0, -towards, inf) - spare
-            of_bodies = tuple(np.where(overlaps, parting, each) for each in of_bodies)
+            of_bodies = [np.where(overlaps, parting, each) for each in of_bodies]
         found = wall, of_bodies[0], wall_seen, of_bodies[1]
         return Outlook(*(float(each.min(initial=inf)) + spare for each in found))
 
@@ -508,21 +510,22 @@ class MPCCBF(Controller):
             zone = as_ellipse(zone, self._s.zone_speed)
         return circle_around(zone) if person.heading is None else zone
 
-    def _ask(
-        self, name: str, at: ArrayLike, people: Sequence[Person]
-    ) -> tuple[Scene, Array]:
-        """The scene of a robot at rest at a point of this `name`, and h of the disc there."""
-        x, y = point = check_point(name, at)
-        scene = self._make_scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
-        return scene, Obstacles.of(scene.barriers.items, self.settings).h(x, y)
-
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h at a `position`: of the zones of `people`, then of everything fixed, shape (obstacles,) [m]."""
-        return self._ask("position", position, people)[1]
+        x, y = point = check_point("position", position)
+        scene = self._make_scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
+        return Obstacles.of(scene.barriers.items, self.settings).h(x, y)
+
+    def _find_h_of_goal(self, goal: ArrayLike, people: Sequence[Person]) -> Array:
+        """The barriers at a `goal`; inf for people who walk, because they leave it free."""
+        h = self.barriers(check_point("goal", goal), people)
+        walk = [hypot(*person.velocity) >= STANDING_SPEED for person in people]
+        h[: len(people)][walk] = inf
+        return h
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
         """True if h < 0 at the `goal`, because of something fixed or of one of `people` who stands."""
-        return self._ask("goal", goal, people)[0].goal_blocked
+        return bool((self._find_h_of_goal(goal, people) < 0).any())
 
     def check_start(
         self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()
@@ -536,25 +539,22 @@ class MPCCBF(Controller):
         people : everybody who is present.
         """
         *at, vx, vy = check_vector("state", state, 4)
-        scene, h = self._ask("goal", at, people)
-        blocked, at_goal = self._ask("goal", goal, people)
-        limit, speed, n = self._s.v_max, hypot(vx, vy), len(people)
-        of_fixed = at_goal[n:]
+        h, at_goal = self.barriers(at, people), self._find_h_of_goal(goal, people)
+        here, tracked = (*at, vx, vy), TrackedPeople(tuple(people))
+        scene, limit = self._make_scene(here, (0.0, 0.0), tracked), self._s.v_max
         if (h < 0).any():
             i = int(h.argmin())
             raise SolverError(
                 f"the run starts in violation: h = {h[i]:.3f} m for {scene.name(i)} at {at}; start where "
                 "h >= 0"
             )
-        cause = "in the zone of a person who stands"
-        if (of_fixed < 0).any():
-            i = int(of_fixed.argmin())
-            cause = f"too close to {scene.name(n + i)} (h = {of_fixed[i]:.3f} m)"
-        if blocked.goal_blocked:
+        if (at_goal < 0).any():
+            i = int(at_goal.argmin())
             raise SolverError(
-                f"the goal {list(blocked.goal)} cannot be reached: it lies {cause}; choose one where h >= 0"
+                f"the goal {np.asarray(goal).tolist()} cannot be reached: it lies too close to "
+                f"{scene.name(i)} (h = {at_goal[i]:.3f} m); choose one where h >= 0"
             )
-        if speed > limit:
+        if (speed := hypot(vx, vy)) > limit:
             raise SolverError(
                 f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s"
             )

@@ -382,8 +382,8 @@ class Step:
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
             "v_max": not self.passively_safe,
             f"time was up after {late} s; what helps: a larger one": self.timed_out,
-            f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what helps: "
-            "another goal": scene.goal_blocked,
+            f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
+            "helps: another goal": scene.goal_blocked,
             "walls leave no way to the goal, so the robot goes to the nearest point that it can reach; what "
             "helps: another goal": self.way_length == inf,
             f"{self.rejected} measurements of people were rejected; {self.unknown} are "

@@ -139,27 +139,20 @@ class Map:
 
     def __init__(self, fixed: Obstacles, points: Array, cell: float = CELL) -> None:
         boxes = [g.kind.bounds(g.numbers, g.offsets) for g in fixed.groups]
-        ends = np.concatenate([np.zeros((0, 2)), *(e for box in boxes for e in box)])
+        ends = np.vstack([np.zeros((0, 2)), *(each for box in boxes for each in box)])
         ends = ends[np.isfinite(ends).all(axis=1)]
         first, last = points.min(axis=0), points.max(axis=0)
-        low = np.minimum(
-            first - _AROUND_POINTS, ends.min(axis=0, initial=inf) - _AROUND_WALLS
-        )
-        high = np.maximum(
-            last + _AROUND_POINTS, ends.max(axis=0, initial=-inf) + _AROUND_WALLS
-        )
+        low = np.vstack([first - _AROUND_POINTS, ends - _AROUND_WALLS]).min(axis=0)
+        high = np.vstack([last + _AROUND_POINTS, ends + _AROUND_WALLS]).max(axis=0)
         # of a large building the part around the points
-        (w, h), most = last - first, MOST_CELLS * cell**2
-        margin = (sqrt(max((w - h) ** 2 + 4 * most, (w + h) ** 2)) - w - h) / 4
-        margin = max(margin, _AROUND_POINTS)
+        w, h = last - first
+        half = sqrt(max((w - h) ** 2 + 4 * MOST_CELLS * cell**2, (w + h) ** 2))
+        margin = max((half - w - h) / 4, _AROUND_POINTS)
         self.corner = np.maximum(low, first - margin)
         size = np.minimum(high, last + margin) - self.corner
         self.cell = max(cell, float(sqrt(size.prod() / MOST_CELLS)))
-        self.shape: tuple[int, ...] = tuple(
-            np.ceil(size / self.cell).astype(int).tolist()
-        )
-        offsets = [g.offsets.min(initial=inf) for g in fixed.groups]
-        self._is_thin = min(offsets, default=inf) < 2 * self.cell
+        self.shape = tuple(np.ceil(size / self.cell).astype(int).tolist())
+        self._is_thin = any(g.offsets.min() < 2 * self.cell for g in fixed.groups)
         covered = self._cover(fixed)
         self.free = ~covered | covered.all()
         self._places = np.argwhere(self.free)
@@ -189,19 +182,16 @@ class Map:
 
     def _link(self) -> None:
         """Find the pairs of free neighbours, in 16 directions, and their distances."""
-        nx, ny = self.shape
-        padded = np.full((nx + 4, ny + 4), -1, np.int32)
+        padded = np.pad(np.full(self.shape, -1, np.int32), 2, constant_values=-1)
         self._numbers = padded[2:-2, 2:-2]
         self._numbers[self.free] = np.arange(len(self._places))
-        begins, ends, lengths = list[Any](), list[Any](), list[Array]()
-        for a, b in _NEIGHBOURS:
-            to = padded[2 + a : nx + 2 + a, 2 + b : ny + 2 + b]
-            both = (self._numbers >= 0) & (to >= 0)
-            begins.append(self._numbers[both])
-            ends.append(to[both])
-            lengths.append(np.full(len(begins[-1]), self.cell * hypot(a, b)))
-        self._pairs = np.concatenate(begins), np.concatenate(ends)
-        self._lengths = np.concatenate(lengths)
+        pairs, lengths = list[Array](), list[Array]()
+        for step in _NEIGHBOURS:
+            to = padded[tuple(slice(2 + n, n - 2 or None) for n in step)]
+            both = np.stack([self._numbers, to])[:, (self._numbers >= 0) & (to >= 0)]
+            pairs.append(both)
+            lengths.append(np.full(both.shape[1], self.cell * hypot(*step)))
+        self._pairs, self._lengths = np.hstack(pairs), np.concatenate(lengths)
 
     def centers(self, cells: Cells) -> Array:
         """Centres of `cells`, shape (n, 2) [m]."""
@@ -215,42 +205,38 @@ class Map:
     def locate(self, points: Array) -> tuple[Cells, Cells]:
         """The cells of `points`, shape (..., 2), as two indices; beyond the map the nearest one."""
         cells = np.floor((points - self.corner) / self.cell).astype(int)
-        i, j = np.moveaxis(cells.clip(0, np.array(self.shape) - 1), -1, 0)
+        i, j = np.moveaxis(np.minimum(cells.clip(0), np.subtract(self.shape, 1)), -1, 0)
         return i, j
 
     def find_cell(self, point: ArrayLike, among: Mask | None = None) -> tuple[int, ...]:
         """The cell of a `point`, or the nearest one that is free, or is `among` these."""
         at, mask = self.locate(np.array(point)), self.free if among is None else among
-        if mask[at]:
-            return int(at[0]), int(at[1])
-        places = np.argwhere(mask)
-        return tuple(places[((places - at) ** 2).sum(axis=1).argmin()].tolist())
+        if not mask[at]:
+            places = np.argwhere(mask)
+            at = places[((places - at) ** 2).sum(axis=1).argmin()]
+        return int(at[0]), int(at[1])
 
     def measure(self, start: Point, goal: Point, speed: float, price: Array) -> bool:
         """Measure the times to the `goal` at this `speed` [m/s], with the `price` of a second in each cell.
 
         False if there is no way from the `start`: the times are to the nearest point that can be reached.
         """
-        self.price, at = price, self.find_cell(start)
+        self.price, begin = price, self.find_cell(start)
         cost, (i, j) = 1 + price[self.free], self._pairs
         weights = self._lengths / speed * (cost[i] + cost[j]) / 2
-        n = len(cost)
-        graph = coo_array((weights, (i, j)), shape=(n, n)).tocsr()
-        end = self.find_cell(goal)
-        self._measure_from(graph, end)
-        if np.isfinite(self.seconds_to_goal[at]):
-            return True
-        self._measure_from(graph, at)
-        self._measure_from(
-            graph, self.find_cell(goal, np.isfinite(self.seconds_to_goal))
-        )
-        return False
+        graph = coo_array((weights, (i, j)), shape=(len(cost), len(cost))).tocsr()
+        self._measure_from(graph, self.find_cell(goal))
+        is_reached = bool(np.isfinite(self.seconds_to_goal[begin]))
+        if not is_reached:
+            self._measure_from(graph, begin)
+            nearest = self.find_cell(goal, np.isfinite(self.seconds_to_goal))
+            self._measure_from(graph, nearest)
+        return is_reached
 
     def _measure_from(self, graph: Any, cell: tuple[int, ...]) -> None:
-        far, self._next = dijkstra(
-            graph, directed=False, indices=self._numbers[cell], return_predecessors=True
-        )
-        self.seconds_to_goal, self.end = np.full(self.shape, inf), cell
+        number, self.end = self._numbers[cell], cell
+        far, self._next = dijkstra(graph, False, number, return_predecessors=True)
+        self.seconds_to_goal = np.full(self.shape, inf)
         self.seconds_to_goal[self.free] = far
 
     def descend(self, cell: Any) -> Array:
@@ -269,13 +255,11 @@ class Map:
         longest = np.abs(ends - start).max(initial=0.0) * (1 + self._is_thin)
         shares = np.linspace(0, 1, 2 + int(longest / self.cell))
         offsets = shares[:, None, None] * (ends - start)
-        nearest = 1.5 * self.cell
-        if self._is_thin and not blocked[self.locate(start)]:
-            nearest = 0.0
-        is_away = np.hypot(*np.moveaxis(offsets, -1, 0)) >= nearest
-        return np.asarray(
-            ~(blocked[self.locate(start + offsets)] & is_away).any(axis=0)
-        )
+        is_open = self._is_thin and not blocked[self.locate(start)]
+        nearest = 0.0 if is_open else 1.5 * self.cell
+        distances = np.hypot(*offsets.T).T
+        hidden = blocked[self.locate(start + offsets)] & (distances >= nearest)
+        return np.asarray(~hidden.any(axis=0))
 
     def list_around(self, at: Point, people: Array) -> Array:
         """Places of `people`, and those near `at` that are not free, at `_TIMES`, shape (n, k, 2) [m]."""
@@ -617,21 +601,22 @@ def _name(m: Map, way: Way, people: Array, numbers: Cells) -> str:
     """A way in words: a door, the side of people whom it passes, and for whom it waits."""
     found, points = _find_door(m, way), way.at(_TIMES)
     for number, places in zip(numbers, people, strict=True):
-        offset = points - places
-        k = int(np.hypot(*offset.T).argmin())
-        if not 0 < k < len(_TIMES) - 1 or np.hypot(*offset[k]) > _NAMED_WITHIN:
+        offsets = points - places
+        k = int(np.hypot(*offsets.T).argmin())
+        if not 0 < k < len(_TIMES) - 1 or np.hypot(*offsets[k]) > _NAMED_WITHIN:
             continue
-        dx, dy = points[k + 1 :][:5][-1] - points[max(k - 5, 0)]
-        (x, y), (vx, vy) = offset[k], (places[k + 1] - places[k]) / _TICK
-        walks = max(hypot(vx, vy), STANDING_SPEED)
-        side = "left of" if dx * y - dy * x > 0 else "right of"
-        if abs(dx * vy - dy * vx) > 0.5 * hypot(dx, dy) * walks:
-            side = "in front of" if x * vx + y * vy > 0 else "behind"
+        # complex numbers: the conjugate of u times v has the angle from u to v
+        back = complex(*points[k + 1 :][:5][-1] - points[max(k - 5, 0)]).conjugate()
+        walk, offset = complex(*places[k + 1] - places[k]) / _TICK, complex(*offsets[k])
+        side = "left of" if (back * offset).imag > 0 else "right of"
+        if abs((back * walk).imag) > abs(back) / 2 * max(abs(walk), STANDING_SPEED):
+            is_before = (walk.conjugate() * offset).real > 0
+            side = "in front of" if is_before else "behind"
         found.append((_TIMES[k], f"{side} person {number}"))
     words = [word for _, word in sorted(found)[:_NAMED]]
     moved = np.hypot(*np.diff(points, axis=0).T)
-    away = np.hypot(*(way.points - way.points[-1]).T) > 2 * m.cell
-    arrival = way.times[away].max(initial=0.0)
+    is_away = np.hypot(*(way.points - way.points[-1]).T) > 2 * m.cell
+    arrival = way.times[is_away].max(initial=0.0)
     rests = (moved < 0.2 * moved.max(initial=0.0)) & (_TIMES[1:] < arrival)
     if rests.sum() >= _WAITING and len(people):
         last = points[np.flatnonzero(rests)[-1]]

@@ -412,7 +412,7 @@ def test_check_start_refuses_starts_and_goals_that_violate_something():
     for state, goal, people, message in (
         ((-1.0, 0.0, 0.0, 0.0), GOAL, [FACING], "starts in violation.*person 0"),
         ((-4.0, 2.8, 0.0, 0.0), GOAL, [], "starts in violation.*wall 0"),
-        ((-4.0, 0.0, 0.0, 0.0), (0.3, 0.0), [FACING], "zone of a person who stands"),
+        ((-4.0, 0.0, 0.0, 0.0), (0.3, 0.0), [FACING], "lies too close to person 0"),
         ((-4.0, 0.0, 1.2, 0.0), GOAL, [], "1.200 m/s; the limit is 1.0 m/s"),
     ):
         with pytest.raises(szlib.SolverError, match=message):
