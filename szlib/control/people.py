@@ -24,7 +24,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from math import atan2, dist, hypot, inf, isfinite
-from typing import Any, NamedTuple, Protocol, TypeGuard, cast
+from typing import Any, NamedTuple, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,26 +52,21 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
     ZoneError if it is none, reaches beyond `LARGEST`, or does not contain the person's position. It may be
     smaller than a body, as a measured zone may be: `Step.safe` keeps the robot off bodies besides.
     """
-    if not isinstance(zone, Ellipse):
-        found = getattr(zone, "ellipse", None)
-        if callable(found):
-            found = found(speed)
-        if not isinstance(found, Ellipse):
-            raise ZoneError(
-                f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}"
-            )
-        zone = found
-    (m, n), (a, _) = zone.center, zone.semi_axes
-    if not max(abs(m), abs(n), a) <= LARGEST:
+    found = zone if isinstance(zone, Ellipse) else getattr(zone, "ellipse", None)
+    if callable(found):
+        found = found(speed)
+    if not isinstance(found, Ellipse):
         raise ZoneError(
-            f"a zone must lie within {LARGEST:g} m of its person; got {zone}"
+            f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}"
         )
-    xa, ya, xb, yb, a = zone.foci_and_axis
+    is_near = max(*map(abs, found.center), found.semi_axes[0]) <= LARGEST
+    require(is_near, "a zone", found, f"within {LARGEST:g} m of its person", ZoneError)
+    xa, ya, xb, yb, a = found.foci_and_axis
     if hypot(xa, ya) + hypot(xb, yb) > 2 * a * (1 + 1e-9):
         raise ZoneError(
-            f"a zone must contain its person, who is at (0, 0) of its frame; got {zone}"
+            f"a zone must contain its person, who is at (0, 0) of its frame; got {found}"
         )
-    return zone
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,59 +99,50 @@ class Prediction:
     (1.25, 0.75)
     """
 
-    times: ArrayLike
-    positions: ArrayLike
-    spread: ArrayLike = 0.0
+    times: Any
+    positions: Any
+    spread: Any = 0.0
 
     def __post_init__(self) -> None:
-        times = check_array("the times of a prediction", self.times, (...,))
-        n = len(times) if times.ndim == 1 else 0
-        is_later = n > 0 and times[0] > 0 and bool((np.diff(times) > 0).all())
-        expected = "positive and increasing, shape (T,)"
-        require(
-            is_later, "the times of a prediction", self.times, expected, SolverError
-        )
-        name = "the positions of a prediction"
-        positions = check_array(name, self.positions, (n, 2))
-        spread = check_array("the spread of a prediction", self.spread, (...,))
+        name = "the times of a prediction"
+        times = check_array(name, self.times, (...,))
+        n, expected = times.size, "positive and increasing, shape (T,)"
+        is_later = times.shape == (n,) and (np.diff(times, prepend=0.0) > 0).all()
+        require(n and is_later, name, self.times, expected, SolverError)
+        positions = check_array("the positions of a prediction", self.positions, (n, 2))
+        name = "the spread of a prediction"
+        spread = check_array(name, self.spread, (...,))
         if spread.shape == (n, 2, 2):
-            variances = np.linalg.eigvalsh((spread + spread.swapaxes(1, 2)) / 2)
-            spread = np.sqrt(variances.max(axis=1).clip(0.0))
-        is_spread = spread.shape in ((), (n,)) and bool((spread >= 0).all())
+            spread = np.sqrt(np.linalg.norm(spread, ord=2, axis=(1, 2)))
+        is_spread = spread.shape in ((), (n,)) and (spread >= 0).all()
         expected = f"at least 0: a number, or of shape ({n},) or ({n}, 2, 2)"
-        require(is_spread, "the spread", self.spread, expected, SolverError)
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "spread", np.broadcast_to(spread, n))
+        require(is_spread, name, self.spread, expected, SolverError)
+        spread = np.broadcast_to(spread, n)
+        vars(self).update(times=times, positions=positions, spread=spread)
 
     def sample(self, person: Person, times: Array) -> Array:
         """Offset of a `person` from constant velocity and growth of the zone at `times`, (n, 3) [m]."""
-        (x, y), (vx, vy) = person.position, person.velocity
-        own, xy = np.asarray(self.times), np.asarray(self.positions)
-        growth = SPREAD * np.asarray(self.spread)
-        steady = np.column_stack([x + own * vx, y + own * vy])
-        offsets = np.column_stack([xy - steady, growth])
-        knots = np.r_[0.0, own]
+        steady = np.add(person.position, np.outer(self.times, person.velocity))
+        offsets = np.column_stack([self.positions - steady, SPREAD * self.spread])
+        knots = np.r_[0.0, self.times]
         rows = [np.interp(times, knots, np.r_[0.0, each]) for each in offsets.T]
         return np.column_stack(rows)
 
     def later(self, seconds: float) -> Prediction | None:
         """The same prediction for the person `seconds` later; None if nothing of it is left."""
-        times = np.asarray(self.times) - seconds
-        left = times > 0
+        left = self.times > seconds
         if not left.any():
             return None
-        xy, spread = np.asarray(self.positions), np.asarray(self.spread)
-        return Prediction(times[left], xy[left], spread[left])
+        times = self.times[left] - seconds
+        return Prediction(times, self.positions[left], self.spread[left])
 
 
 def list_knots(person: Person, settings: MPCSettings) -> Array:
     """What a `PredictedZone` of a `person` needs for each interval of the horizon of these `settings`."""
-    times = np.array(settings.times)
-    if person.prediction is None:
-        return np.column_stack([times[1:], np.zeros((settings.N, 3))]).ravel()
-    offsets = person.prediction.sample(person, times)
-    rates = np.diff(offsets, axis=0) / np.diff(times)[:, None]
+    times, rates = np.array(settings.times), np.zeros((settings.N, 3))
+    if person.prediction is not None:
+        offsets = person.prediction.sample(person, times)
+        rates = np.diff(offsets, axis=0) / np.diff(times)[:, None]
     return np.column_stack([times[1:], rates]).ravel()
 
 
@@ -165,7 +151,7 @@ SPREAD = 1.64
 
 
 def predict(
-    people: ArrayLike, times: ArrayLike, positions: ArrayLike, spread: ArrayLike = 0.0
+    people: ArrayLike, times: ArrayLike, positions: Any, spread: Any = 0.0
 ) -> list[Person]:
     """`Person`s with the predictions of all of them.
 
@@ -187,19 +173,15 @@ def predict(
     >>> one.after(1.0).position
     (1.0, 0.2)
     """
-    rows, xy = check_array("people", people, (..., 4)), np.asarray(positions)
-    spreads = np.asarray(spread)
-    require(rows.ndim == 2, "people", rows.shape, "of shape (n, 4)", SolverError)
-    for name, given in (("positions", xy), ("spread", spreads)):
-        is_each = given.shape[:1] == (len(rows),) or (
-            given is spreads and not given.ndim
-        )
+    rows = check_array("people", people, (*np.shape(people)[:1], 4)).tolist()
+    spreads = spread if np.ndim(spread) else np.full(len(rows), spread)
+    for name, given in (("positions", positions), ("spread", spreads)):
+        is_each = np.shape(given)[:1] == np.shape(rows)[:1]
         expected = f"one for each of {len(rows)} people"
-        require(is_each, name, given.shape, expected, SolverError)
-    spreads = spreads if spreads.ndim else np.full(len(rows), spreads)
+        require(is_each, name, np.shape(given), expected, SolverError)
     return [
-        Person((x, y), (vx, vy), prediction=Prediction(times, own, of))
-        for (x, y, vx, vy), own, of in zip(rows.tolist(), xy, spreads, strict=True)
+        Person((x, y), (vx, vy), prediction=Prediction(times, xy, own))
+        for (x, y, vx, vy), xy, own in zip(rows, positions, spreads, strict=True)
     ]
 
 
@@ -249,20 +231,18 @@ class Person:
     group: Hashable = None
 
     def __post_init__(self) -> None:
-        x, y = position = check_point("a person's position", self.position)
-        vx, vy = velocity = check_point("a person's velocity", self.velocity)
-        object.__setattr__(self, "position", position)
-        object.__setattr__(self, "velocity", velocity)
+        position = check_point("a person's position", self.position)
+        velocity = check_point("a person's velocity", self.velocity)
+        vars(self).update(position=position, velocity=velocity)
         if self.heading is not None:
-            object.__setattr__(
-                self, "heading", check_number("a person's heading", self.heading)
-            )
+            heading = check_number("a person's heading", self.heading)
+            vars(self).update(heading=heading)
             if self.heading_unknown:
                 raise SolverError(
-                    f"a heading is given or unknown; got {self.heading} and heading_unknown for {(x, y)}"
+                    f"a heading is given or unknown; got {heading} and heading_unknown for {position}"
                 )
         elif not (self.stands or self.heading_unknown):
-            object.__setattr__(self, "heading", atan2(vy, vx))
+            vars(self).update(heading=atan2(velocity[1], velocity[0]))
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
         if not isinstance(self.prediction, Prediction | None):
@@ -285,15 +265,13 @@ class Person:
             return self.at((x, y))
         (dx, dy, _), *_ = self.prediction.sample(self, np.array([seconds])).tolist()
         moved = self.at((x + dx, y + dy))
-        object.__setattr__(moved, "prediction", self.prediction.later(seconds))
+        vars(moved).update(prediction=self.prediction.later(seconds))
         return moved
 
     def at(self, position: tuple[float, float]) -> Person:
         """The same person at another `position` [m]; only the position is checked, for speed."""
         moved = copy(self)
-        object.__setattr__(
-            moved, "position", check_point("a person's position", position)
-        )
+        vars(moved).update(position=check_point("a person's position", position))
         return moved
 
 
@@ -351,8 +329,8 @@ class Tracker:
 
     def __init__(self, *, walking_speed: float = 0.2, memory: float = 1.0) -> None:
         for name, value in (("walking_speed", walking_speed), ("memory", memory)):
-            if not (isinstance(value, int | float | np.number) and 0 <= value < inf):
-                raise SolverError(f"{name} must be a finite number >= 0; got {value!r}")
+            is_time = isinstance(value, int | float | np.number) and 0 <= value < inf
+            require(is_time, name, value, "a finite number >= 0", SolverError)
         self.walking_speed, self.memory = float(walking_speed), float(memory)
         self._last_seen: dict[Hashable, _LastSeen] = {}
         self._now, self._interval = inf, 0.0
@@ -434,23 +412,22 @@ class Tracker:
         given: Counter[Hashable],
     ) -> _LastSeen | None:
         """What is known of the person of a measurement: by their id, or by their place if the id is new."""
-        is_in_time = time <= now + self.memory
-        last = self._last_seen.get(name)
-        if last is None and is_in_time:
-            lost = [
-                (_measure_deviation(row, time, *seen), other)
+        last, is_in_time = self._last_seen.get(name), time <= now + self.memory
+        if not is_in_time:
+            return last
+        if last is None:
+            lost = {
+                other: _measure_deviation(row, time, *seen)
                 for other, seen in self._last_seen.items()
                 if other not in given and seen[1] <= time
-            ]
-            nearest, other = min(lost, key=lambda each: each[0], default=(inf, None))
-            return self._last_seen.pop(other) if nearest <= SAME_PLACE else None
-        is_later = last is not None and last[1] <= time and is_in_time
-        if last is not None and is_later:
-            deviation = _measure_deviation(row, time, *last)
-            if SAME_PERSON < deviation < inf:
-                # may be hidden, and has no id any more
-                self._last_seen[Tracker, name] = last
-                return None
+            }
+            nearest = min(lost, key=lost.__getitem__, default=None)
+            is_same = lost.get(nearest, inf) <= SAME_PLACE
+            return self._last_seen.pop(nearest) if is_same else None
+        if last[1] <= time and SAME_PERSON < _measure_deviation(row, time, *last) < inf:
+            # may be hidden, and has no id any more
+            self._last_seen[Tracker, name] = last
+            return None
         return last
 
     def _update(
@@ -538,23 +515,17 @@ def _have_no_ids(people: People) -> TypeGuard[Sequence[Person]]:
     return True
 
 
-def _split_rows(people: People) -> Sequence[Person | list[float]]:
+def _split_rows(people: Any) -> list[Any]:
     """People one by one: `Person`s, or (x, y, vx, vy), finite or not."""
-    try:
-        if not isinstance(people, np.ndarray):
-            given = list(cast(Sequence[Person], people))
-            if all(isinstance(person, Person) for person in given):
-                return given
-        numbers = np.asarray(people, float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise SolverError(
-            f"people must be Persons, or numbers of shape (n, 4); got {people!r:.200}"
-        ) from error
-    if numbers.size and (numbers.ndim != 2 or numbers.shape[1] != 4):
-        raise SolverError(
-            f"people as an array must have shape (n, 4): x, y, vx, vy; got {numbers.shape}"
-        )
-    return cast(list[list[float]], numbers.reshape(-1, 4).tolist())
+    if isinstance(people, Iterable) and not isinstance(people, np.ndarray):
+        people = list(people)
+        if all(isinstance(person, Person) for person in people):
+            return list(people)
+    expected = "Persons, or numbers of shape (n, 4): x, y, vx, vy"
+    numbers = _as_floats("people", people, expected)
+    is_rows = numbers.shape[1:] == (4,) or not numbers.size
+    require(is_rows, "people", numbers.shape, expected, SolverError)
+    return list(numbers.reshape(-1, 4).tolist())
 
 
 def _check_names(
@@ -568,10 +539,8 @@ def _check_names(
         raise SolverError(
             f"ids must be a list of hashable values; got {ids!r:.200}"
         ) from error
-    if len(names) != len(rows):
-        raise SolverError(
-            f"ids must be one for each of {len(rows)} people; got {len(names)}"
-        )
+    expected = f"one for each of {len(rows)} people"
+    require(len(names) == len(rows), "ids", len(names), expected, SolverError)
     return names, given
 
 
@@ -579,12 +548,12 @@ def _check_stamps(stamps: ArrayLike | None, n: int, now: float) -> list[float]:
     """When each person was measured [s], finite or not."""
     if stamps is None:
         return [now] * n
-    times = _as_floats("stamps", stamps)
-    if times.shape not in ((), (n,)):
-        raise SolverError(
-            f"stamps must be one time, or one for each of {n} people; got shape {times.shape}"
-        )
-    return cast(list[float], np.broadcast_to(times, n).tolist())
+    times, expected = (
+        _as_floats("stamps", stamps),
+        f"one time, or one for each of {n} people",
+    )
+    require(times.shape in ((), (n,)), "stamps", times.shape, expected, SolverError)
+    return list(np.broadcast_to(times, n).tolist())
 
 
 def check_time(now: float) -> float:
@@ -592,14 +561,14 @@ def check_time(now: float) -> float:
     if type(now) is float and isfinite(now):
         return now
     time = _as_floats("now", now)
-    if time.shape or not np.isfinite(time):
-        raise SolverError(f"now must be a finite time [s]; got {now!r}")
+    is_time = not time.shape and np.isfinite(time)
+    require(is_time, "now", now, "a finite time [s]", SolverError)
     return float(time)
 
 
-def _as_floats(name: str, value: ArrayLike) -> Array:
+def _as_floats(name: str, value: Any, expected: str = "numbers [s]") -> Array:
     """The numbers of an argument, finite or not."""
     try:
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError) as error:
-        raise SolverError(f"{name} must be numbers [s]; got {value!r:.200}") from error
+        raise SolverError(f"{name} must be {expected}; got {value!r:.200}") from error

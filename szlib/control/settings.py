@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from itertools import accumulate
@@ -11,7 +12,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..checks import check_array, check_number, require
+from ..checks import Array, check_array, check_number, require
 from ..errors import SolverError
 
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
@@ -23,7 +24,7 @@ _CHOICES = {"margin": Margin, "pass_side": Side, "solver": Solver, "terminal": T
 _COUNTS = "N", "N_h", "max_iterations"
 _LIMITS = "lookahead", "decay_price", "zone_price", "time_limit", "deadline"
 # Ranges of numbers: as a check, in words, and the settings that must lie in it.
-_RANGES = (
+_RANGES: tuple[tuple[Callable[[Array], Any], str, tuple[str, ...]], ...] = (
     (
         lambda v: v > 0,
         "positive",
@@ -38,7 +39,7 @@ _RANGES = (
     (lambda v: (v >= 0) & (v <= 0.5), "in [0, 0.5]", ("head_on_share",)),
 )
 # What the paper has instead of the default, and the sources of the defaults that are not the paper's.
-_PAPER = {
+_PAPER: dict[str, Any] = {
     "margin": "paper",
     "head_on_share": 0.0,
     "guard": False,
@@ -237,7 +238,7 @@ class MPCSettings:
         """
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
         reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
-        own = {
+        own: dict[str, Any] = {
             "gamma": 0.2,
             "grid": grid,
             "jerk_weight": 6.0,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
 from math import cos, sin
 from pathlib import Path
 from typing import Any
@@ -17,24 +16,16 @@ import shapely
 import yaml
 from numpy.typing import ArrayLike
 from PIL import Image
+from shapely.affinity import affine_transform
 
 from ..checks import Array, check_array, check_number, require
 from ..errors import DataError, SolverError
 from ..input_files import printable, read_small
-from .obstacles import SHORTEST_WALL, Wall, check_wall
+from .obstacles import SHORTEST_WALL
 
 _NUMBERS = {"origin": (3,), "resolution": (), "free_thresh": (), "occupied_thresh": ()}
-_EIGHT_BITS = ("1", "L", "LA", "P", "PA", "RGB", "RGBA")
+_EIGHT_BITS = "1", "L", "LA", "P", "PA", "RGB", "RGBA"
 _MOST_PIXELS = 50_000_000  # of a picture; a file of 10 MB may hold many more
-_FAULTS = (
-    OSError,
-    ValueError,
-    TypeError,
-    SyntaxError,
-    RuntimeError,
-    yaml.YAMLError,
-    Image.DecompressionBombError,
-)
 Circle = tuple[float, float, float]
 
 
@@ -59,12 +50,14 @@ def read_walls(walls: Any) -> Array:
     >>> read_walls([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]).shape  # a polyline of two segments
     (2, 2, 2)
     """
-    segments = [
-        check_wall(segment)
-        for line in _find_lines(walls)
-        for segment in _split_line(line)
-    ]
-    return np.reshape(np.array(segments, float), (-1, 2, 2))
+    lines = np.concatenate([[], *(lines for lines, _ in _find_shapes(walls))])
+    check_array("a wall", shapely.get_coordinates(lines), (..., 2))
+    lines = shapely.remove_repeated_points(lines, SHORTEST_WALL)
+    is_long, expected = shapely.length(lines) > 0, f"{SHORTEST_WALL} m long or longer"
+    require(is_long.all(), "a wall", lines[~is_long], expected, SolverError)
+    corners, line = shapely.get_coordinates(lines, return_index=True)
+    ends = np.stack([corners[:-1], corners[1:]], axis=1)
+    return np.asarray(ends[line[:-1] == line[1:]])
 
 
 class Walls(np.ndarray[Any, np.dtype[np.float64]]):
@@ -80,61 +73,45 @@ class Walls(np.ndarray[Any, np.dtype[np.float64]]):
 
 def find_solids(walls: Any) -> Any:
     """The union of the polygons among `walls`, and of `Walls.solids`; None if there are none."""
-    if hasattr(walls, "exterior"):
-        return shapely.make_valid(
-            shapely.Polygon(
-                walls.exterior.coords, [hole.coords for hole in walls.interiors]
-            )
-        )
-    parts = getattr(walls, "geoms", walls)
-    if isinstance(parts, np.ndarray) or not isinstance(parts, Iterable):
-        return getattr(walls, "solids", None)
-    found = [solid for part in parts if (solid := find_solids(part)) is not None]
+    found = [area for _, area in _find_shapes(walls) if area is not None]
     return shapely.union_all(found) if found else None
 
 
-def _find_lines(walls: Any) -> Iterator[Any]:
-    """Find each line among nested `walls`, as a list of its corners."""
-    if hasattr(walls, "geoms"):
-        parts = list(walls.geoms)
-    elif hasattr(walls, "exterior"):
-        parts = [walls.exterior, *walls.interiors]
-    elif hasattr(walls, "coords"):
-        parts = [corner[:2] for corner in walls.coords]
-    elif isinstance(walls, Iterable) and not isinstance(walls, str):
-        parts = list(walls)
-    else:
-        raise SolverError(
-            f"a wall must be a segment, a line, or one of Shapely's; got {walls!r}"
-        )
-    if parts and all(_is_corner(part) for part in parts):
-        yield parts
+def _find_shapes(walls: Any) -> Iterator[tuple[Any, Any]]:
+    """Lines among nested `walls`, shape (n,), each with the area that they enclose, or None; of Shapely."""
+    parts = getattr(walls, "geoms", walls)
+    if hasattr(parts, "exterior"):
+        holes = [hole.coords for hole in parts.interiors]
+        area = shapely.Polygon(parts.exterior.coords, holes)
+        yield shapely.get_parts(area.boundary), shapely.make_valid(area)
+    elif hasattr(parts, "coords"):
+        yield _draw_lines([corner[:2] for corner in parts.coords]), None
+    elif isinstance(parts, str) or not isinstance(parts, Iterable):
+        expected = "a segment, a line, or one of Shapely's"
+        raise SolverError(f"a wall must be {expected}; got {walls!r}")
+    elif isinstance(parts, np.ndarray) or any(map(_is_corner, parts)):
+        yield _draw_lines(parts), getattr(parts, "solids", None)
     else:
         for part in parts:
-            yield from _find_lines(part)
+            yield from _find_shapes(part)
 
 
 def _is_corner(part: Any) -> bool:
-    return isinstance(part, Sequence | np.ndarray) and all(
-        np.isscalar(number) for number in part
-    )
+    return isinstance(part, Sequence | np.ndarray) and all(map(np.isscalar, part))
 
 
-def _split_line(line: Any) -> list[Array]:
-    """Split a line into its segments."""
-    if np.shape(line)[1:] == (4,):
+def _draw_lines(corners: Any) -> Any:
+    """Lines of Shapely from their corners, shape (..., m, 2) [m]."""
+    given = np.shape(corners)
+    if given[1:] == (4,):
         raise SolverError(
             "walls must be segments [[(xa, ya), (xb, yb)], ...], shape (n, 2, 2); got rows of four numbers: "
             "use np.reshape(walls, (-1, 2, 2))"
         )
-    corners = check_array("a wall", line, (..., 2))
-    if len(corners) < 2:
-        raise SolverError(f"a wall needs two end points; got {corners.tolist()}")
-    separate = [corners[0]]
-    for corner in corners[1:]:
-        if np.hypot(*(corner - separate[-1])) >= SHORTEST_WALL:
-            separate.append(corner)
-    return [np.array(ends) for ends in pairwise(separate)] or [corners[[0, -1]]]
+    numbers = check_array("a wall", corners, (..., 2))
+    is_line = numbers.ndim > 1 and numbers.shape[-2] > 1
+    require(is_line, "a wall", given, "of shape (m, 2), with m > 1", SolverError)
+    return np.ravel(shapely.linestrings(numbers))
 
 
 def walls_from_map(
@@ -183,57 +160,64 @@ def walls_from_map(
     """
     what = "the map"
     try:
-        given = {
-            "negate": 0,
-            "mode": "trinary",
-            **yaml.safe_load(read_small(Path(path))),
-        }
-        missing = {"image", *_NUMBERS} - set(given)
-        require(not missing, "a map", f"one without {sorted(missing)}", "complete")
-        origin, side, free, occupied = (
-            check_array(key, given[key], _NUMBERS[key]) for key in _NUMBERS
-        )
-        below = f"from 0 to below occupied_thresh = {occupied}, which is at most 1"
-        for key, holds, expected in (
-            ("resolution", side > 0, "a positive number of metres"),
-            ("free_thresh", 0 <= free < occupied <= 1, below),
-            ("negate", given["negate"] in (0, 1), "0 or 1"),
-            (
-                "mode",
-                given["mode"] in ("trinary", "scale", "raw"),
-                "'trinary', 'scale' or 'raw'",
-            ),
-            ("image", isinstance(given["image"], str), "the name of a picture"),
-        ):
-            require(holds, key, given[key], expected)
-        what = f"image {given['image']!r}"
-        picture = Image.open(io.BytesIO(read_small(Path(path).parent / given["image"])))
-        fits = (
-            picture.mode in _EIGHT_BITS
-            and picture.width * picture.height <= _MOST_PIXELS
-        )
-        require(
-            fits,
-            "it",
-            (picture.mode, picture.size),
-            f"of 8 bits, and at most {_MOST_PIXELS} pixels",
-        )
-        grey, alpha = np.moveaxis(np.asarray(picture.convert("LA"), np.float32), -1, 0)
-    except _FAULTS as fault:
+        entries = _check_entries(yaml.safe_load(read_small(Path(path))))
+        what = f"image {entries['image']!r}"
+        pixels = _read_picture(Path(path).parent / entries["image"], entries["mode"])
+    # whatever YAML, Pillow and NumPy say of a bad file
+    except Exception as fault:
         expected = "a YAML file of map_server with a PGM or PNG picture"
         raise DataError(
             f"{printable(path)}: {what} cannot be read: {fault}; expected {expected}"
         ) from fault
-    if given["mode"] == "raw":
-        is_solid, is_unknown = (grey >= 100 * occupied) & (grey <= 100), grey > 100
-    else:
-        if given["mode"] == "trinary" and picture.has_transparency_data:
-            grey = (3 * grey + alpha) / 4
-        p = (grey if given["negate"] else 255 - grey) / 255
-        is_solid, is_between = p > occupied, (p >= free) & (p <= occupied)
-        is_unknown = is_between & ((given["mode"] == "trinary") | (alpha < 255))
-    cells = (is_solid | (is_unknown & unknown))[::-1]
+    solid, unclear = _classify_pixels(*pixels, entries)
+    cells = (solid | (unclear & unknown))[::-1]
+    side, origin = entries["resolution"], entries["origin"]
     return walls_from_grid(cells, float(side), origin, simplify=simplify, near=near)
+
+
+def _check_entries(given: Any) -> dict[str, Any]:
+    """The entries of a map, with arrays of numbers; DataError if one is missing or cannot be used."""
+    entries = {"negate": 0, "mode": "trinary", **given}
+    missing = {"image", *_NUMBERS} - set(entries)
+    require(not missing, "a map", f"one without {sorted(missing)}", "complete")
+    for key, shape in _NUMBERS.items():
+        entries[key] = check_array(key, entries[key], shape)
+    free, occupied = entries["free_thresh"], entries["occupied_thresh"]
+    below = f"from 0 to below occupied_thresh = {occupied}, which is at most 1"
+    modes = "trinary", "scale", "raw"
+    for key, holds, expected in (
+        ("resolution", entries["resolution"] > 0, "a positive number of metres"),
+        ("free_thresh", 0 <= free < occupied <= 1, below),
+        ("negate", entries["negate"] in (0, 1), "0 or 1"),
+        ("mode", entries["mode"] in modes, " or ".join(map(repr, modes))),
+        ("image", isinstance(entries["image"], str), "the name of a picture"),
+    ):
+        require(holds, key, entries[key], expected)
+    return entries
+
+
+def _read_picture(path: Path, mode: str) -> tuple[Any, Any]:
+    """Grey of the pixels of a map, and True where they are transparent."""
+    picture = Image.open(io.BytesIO(read_small(path)))
+    n = picture.width * picture.height
+    fits = picture.mode in _EIGHT_BITS and n <= _MOST_PIXELS
+    expected = f"of 8 bits, and at most {_MOST_PIXELS} pixels"
+    require(fits, "it", (picture.mode, picture.size), expected)
+    grey, alpha = np.moveaxis(np.asarray(picture.convert("LA"), np.float32), -1, 0)
+    is_mixed = mode == "trinary" and picture.has_transparency_data
+    return (3 * grey + alpha) / 4 if is_mixed else grey, alpha < 255
+
+
+def _classify_pixels(
+    grey: Any, is_transparent: Any, entries: dict[str, Any]
+) -> tuple[Any, Any]:
+    """Which pixels of a map are occupied, and which are unknown."""
+    mode, occupied = entries["mode"], entries["occupied_thresh"]
+    if mode == "raw":
+        return (grey >= 100 * occupied) & (grey <= 100), grey > 100
+    p = (grey if entries["negate"] else 255 - grey) / 255
+    is_between = (p >= entries["free_thresh"]) & (p <= occupied)
+    return p > occupied, is_between & (is_transparent | (mode == "trinary"))
 
 
 def walls_from_grid(
@@ -269,36 +253,22 @@ def walls_from_grid(
         check_number("resolution", resolution),
         check_number("simplify", simplify),
     )
-    require(
-        side > 0 and within >= 0,
-        "resolution, simplify",
-        (side, within),
-        "positive",
-        SolverError,
-    )
-    (x, y, yaw), cells = (
-        check_array("origin", origin, (3,)).tolist(),
-        np.asarray(occupied, bool),
-    )
-    require(
-        cells.ndim == 2,
-        "occupied",
-        cells.shape,
-        "of shape (rows, columns)",
-        SolverError,
-    )
+    require(side > 0, "resolution", side, "positive", SolverError)
+    require(within >= 0, "simplify", within, "at least 0", SolverError)
+    x, y, yaw = check_array("origin", origin, (3,)).tolist()
+    cells = np.asarray(occupied, bool)
+    expected = "of shape (rows, columns)"
+    require(cells.ndim == 2, "occupied", cells.shape, expected, SolverError)
     edges = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (row, begin), end = (edges > 0).nonzero(), (edges < 0).nonzero()[1]
-    solids = shapely.simplify(
-        shapely.union_all(shapely.box(begin, row, end, row + 1)), within / side
-    )
-    turn = side * np.array([[cos(yaw), sin(yaw)], [-sin(yaw), cos(yaw)]])
-    solids = shapely.transform(solids, lambda points: points @ turn + (x, y))
-    segments = read_walls(solids)
+    outlines = shapely.union_all(shapely.box(begin, row, end, row + 1))
+    c, s = side * cos(yaw), side * sin(yaw)
+    turn = [c, -s, s, c, x, y]
+    solids = affine_transform(shapely.simplify(outlines, within / side), turn)
+    walls = read_walls(solids).view(Walls)
     if near is not None:
         px, py, r = check_array("near", near, (3,)).tolist()
-        gaps = Wall.gap(px, py, 0.0, *segments.reshape(-1, 4).T)
-        segments = segments[gaps <= r]
-    walls = segments.view(Walls)
+        gaps = shapely.distance(shapely.linestrings(walls), shapely.Point(px, py))
+        walls = walls[gaps <= r]
     walls.solids = solids
     return walls
