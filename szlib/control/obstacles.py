@@ -314,9 +314,9 @@ class Zone(Obstacle):
     Parameters
     ----------
     numbers : the foci (xa, ya, xb, yb), the semi-major axis, and of the person's `Body` the position (x, y)
-        and the velocity (vx, vy) [m, m/s]. With a `Prediction` there follow, for each interval of the horizon,
-        its end, and the rates at which the person leaves the motion at constant velocity, and at which the zone
-        grows [s, m/s, m/s, m/s].
+        and the velocity (vx, vy) [m, m/s]. With a `Prediction` there follow, for each interval of the
+        horizon, its end, and the rates at which the person leaves the motion at constant velocity, and at
+        which the zone grows [s, m/s, m/s, m/s].
     """
 
     kind = "person"
