@@ -532,7 +532,7 @@ def test_a_drive_step_is_verified_and_explained():
         (lambda step: {"predicted": step.predicted + 1e-4}, "motion of the disc"),
         (
             lambda step: {"point": replace(step.point, inputs=step.point.inputs + 0.1)},
-            "motion differs",
+            "control differs",
         ),
     ],
 )
