@@ -16,19 +16,31 @@ avoidance", IEEE Robotics & Automation Magazine 4(1), 1997.  World frame, metres
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ..checks import Array
-from ..control.controller import Controller
-from ..control.obstacles import Body, Obstacles
-from ..control.people import Person
-from ..control.settings import MPCSettings
-from ..zones.ellipses import BODY_RADIUS
+from ..control import MPCCBF, Body, Controller, MPCSettings, Obstacles, Person
+from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
+
+# Makes a controller for a scenario. A function of a module, so that other processes find it.
+ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
+# Zone of people who have none [m] (assumed); in random worlds all people have one.
+DEFAULT_ZONE = Ellipse((0.0, 0.0), (1.0, 1.0))
+
+
+def make_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
+    """The MPC-CBF controller for a `scenario` with `settings`; people without a zone have `DEFAULT_ZONE`."""
+    return MPCCBF(
+        DEFAULT_ZONE,
+        walls=scenario.walls,
+        obstacles=scenario.obstacles,
+        settings=settings,
+    )
 
 
 class BaselineController(Controller):
@@ -206,3 +218,12 @@ class DynamicWindowController(BaselineController):
         to_goal = np.hypot(*(at[:, -1] - goal).T)
         value = self.clearance * np.minimum(gap.min(axis=1), 1.0) - to_goal
         return np.asarray(window[np.where(admissible, value, -np.inf).argmax()])
+
+
+CONTROLLERS: dict[str, ControllerFactory] = {
+    "MPC-CBF": make_mpc_cbf,
+    "straight": StraightController,
+    "social force": SocialForceController,
+    "dynamic window": DynamicWindowController,
+}
+"""MPC-CBF and its rivals, by name; another rival is one more entry."""

@@ -13,15 +13,14 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
+from ..control import MPCSettings, Person
 from ..control.obstacles import describe, number_kinds, restore
-from ..control.people import Person
-from ..control.settings import MPCSettings
 from ..errors import DataError, SzlibError
 from ..files import write_file
 from ..input_files import open_regular, read_small
 from ..zones.ellipses import Ellipse
 from .metrics import compute_metrics
-from .run import Run, nanmin
+from .robot_run import Run, nanmin
 from .scenario import Scenario
 
 if TYPE_CHECKING:

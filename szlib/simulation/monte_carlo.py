@@ -1,50 +1,58 @@
-"""Monte Carlo: the robot drives through thousands of random worlds; each run is measured and classified.
+"""Monte Carlo: the robot drives through thousands of worlds; each run is measured and classified.
 
     table = szlib.rollouts(10_000, settings=szlib.MPCSettings(), out="results/rollouts")
-    log = szlib.simulation.rerun_world(4711)     # the world of one row again, with every state
+    log = szlib.simulation.RolloutSetup().run(4711)     # the world of one row again, with every state
 
 Worlds run in parallel.  Each chunk of worlds is one Parquet file, written atomically, in a folder named after
 the parameters: an interrupted call continues where it stopped, and a larger `n` adds chunks.
+
+`compare` drives with each combination of controllers, zones, formulations and behaviours through the same
+worlds.  Each zone of the literature is an `Ellipse` in the person's frame, made from the fitted one where it
+depends on it.  Each behaviour violates one expectation of the controller.
+
+Sources: E. T. Hall, "The Hidden Dimension", 1966 (personal distance up to 1.2 m); R. Kirby, R. Simmons,
+J. Forlizzi, "COMPANION: A constraint-optimizing method for person-acceptable navigation", RO-MAN 2009
+(asymmetric Gaussian).
 """
 
 from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache, partial
+from itertools import product
+from math import pi, sqrt
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import joblib
+import numpy as np
 import pandas as pd
 from joblib import delayed
 from tqdm import tqdm
 
 from .. import __version__
-from ..control.controller import Controller
-from ..control.mpc import MPCCBF
-from ..control.settings import MPCSettings
+from ..checks import Array, require
+from ..control import MPCSettings, euclidean_to_ellipse
+from ..control.people import as_ellipse
 from ..errors import SolverError, SzlibError
 from ..files import claim_folder, load_cached, store_cached, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
-from .closed_loop import ZoneTransform, drive
+from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
+from .baseline_controllers import CONTROLLERS, ControllerFactory, make_mpc_cbf
+from .closed_loop import BODY_ZONE, LoopSettings, ZoneTransform, drive
+from .crowds import UNAFFECTED, Behaviour, CrowdModel
 from .log import SimulationLog
-from .run import Run
-from .scenario import UNAFFECTED, Behaviour, CrowdModel, Scenario
-from .scenarios.random_worlds import Worlds
+from .robot_run import Run
+from .scenario import Scenario, Worlds
 
 PURPOSE = "rollouts"  # purpose with which the folder of finished chunks is marked
 
 CHUNK_SIZE = 50  # worlds in one file and in one task: half a second of work
-
-# Zone of people who have none [m] (assumed); in random worlds all people have one.
-DEFAULT_ZONE = Ellipse((0.0, 0.0), (1.0, 1.0))
-
-# Makes a controller for a scenario. A function of a module, so that other processes find it.
-ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
 
 # Makes the scenario of a seed, the same one each time: `Worlds` or another function.
 ScenarioSource = Callable[[int], Scenario]
@@ -53,89 +61,18 @@ ScenarioSource = Callable[[int], Scenario]
 Measure = Callable[[Run], dict[str, float]]
 
 
-def make_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
-    """The MPC-CBF controller for a `scenario` with `settings`; people without a zone have `DEFAULT_ZONE`."""
-    return MPCCBF(
-        DEFAULT_ZONE,
-        walls=scenario.walls,
-        obstacles=scenario.obstacles,
-        settings=settings,
-    )
-
-
-def rollouts(
-    n: int,
-    *,
-    seed: int = 0,
-    settings: MPCSettings | None = None,
-    worlds: ScenarioSource | None = None,
-    behaviour: CrowdModel = UNAFFECTED,
-    controller: ControllerFactory | None = None,
-    zone_transform: ZoneTransform | None = None,
-    measure: Measure | None = None,
-    out: str | Path | None = None,
-    n_jobs: int = 1,
-    progress: bool = True,
-) -> pd.DataFrame:
-    """Drive through the worlds of seeds `seed` to `seed + n - 1`; one row of metrics for each.
+@dataclass(frozen=True)
+class RolloutSetup:
+    """Everything except the seed that decides a row.
 
     Parameters
     ----------
-    n : number of worlds.
-    seed : seed of the first world.
-    settings : settings of the controller and the loop; default: `MPCSettings()`.
-    worlds : `Worlds`, or another function of the seed that makes scenarios; default: `Worlds()`.
-    behaviour : what people do: `Behaviour`, or another `CrowdModel`; default: they walk on.
-    controller : makes the controller for a scenario with these settings; default: `make_mpc_cbf`.
+    settings : settings of the controller and the loop.
+    worlds : `Worlds`, or another function of the seed that makes scenarios.
+    behaviour : what people do: `Behaviour`, or another `CrowdModel`.
+    controller : makes the controller for a scenario with these settings.
     zone_transform : makes the zone that the robot keeps out of from each person's own zone.
     measure : further columns from each run.
-    out : folder for finished chunks; a later call continues from them. Default: no files. The parameters and
-        szlib's version name a folder inside it. After a change of your own code choose another folder.
-    n_jobs : worlds at a time; -1: one for each core.
-    progress : show a progress bar.
-
-    Returns
-    -------
-    seed, and the columns of `szlib.simulation.compute_metrics`, sorted by seed.
-
-    Raises
-    ------
-    SolverError : `n` is not positive, the controller fails in a world (the error names the seed), or `out` is
-        given with a function that is defined inside another: it has no name that other processes know.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> table = szlib.rollouts(2, worlds=szlib.Worlds(duration=2.0), progress=False)
-    >>> table["seed"].tolist(), (table["unflagged_violations"] == 0).all()
-    ([0, 1], np.True_)
-    """
-    if n < 1:
-        raise SolverError(f"n must be at least 1; got {n}")
-    scene = worlds or Worlds(), behaviour, controller or make_mpc_cbf
-    setup = RolloutSetup(settings or MPCSettings(), *scene, zone_transform, measure)
-    folder = None if out is None else Path(out) / setup.key()
-    if folder is not None:
-        claim_folder(folder.parent, PURPOSE)
-        claim_folder(folder, f"{PURPOSE} {setup.key()}")
-        write_file(folder / "parameters.txt", setup.describe() + "\n")
-    chunks = [
-        range(first, min(first + CHUNK_SIZE, seed + n))
-        for first in range(seed, seed + n, CHUNK_SIZE)
-    ]
-    tasks = [delayed(run_chunk)(setup, chunk, folder) for chunk in chunks]
-    tables: list[pd.DataFrame] = []
-    with tqdm(total=n, unit="world", disable=None if progress else True) as bar:
-        for table in run_tasks(tasks, n_jobs=n_jobs):
-            tables.append(table)
-            bar.update(len(table))
-    return pd.concat(tables).sort_values("seed", ignore_index=True)
-
-
-@dataclass(frozen=True)
-class RolloutSetup:
-    """Everything except the seed that decides a row: `settings`, `worlds`, `behaviour`, `controller`,
-    `zone_transform`, `measure`, as of `rollouts`.
     """
 
     settings: MPCSettings = field(default_factory=MPCSettings)
@@ -157,16 +94,15 @@ class RolloutSetup:
     def run(self, seed: int) -> SimulationLog:
         """Drive through the world of a `seed`."""
         scenario = self.worlds(seed)
+        loop = LoopSettings(
+            behaviour=self.behaviour,
+            seed=seed,
+            zone_transform=self.zone_transform,
+            settings=self.settings,
+            until_arrival=False,
+        )
         try:
-            return drive(
-                scenario,
-                self.controller(scenario, self.settings),
-                behaviour=self.behaviour,
-                seed=seed,
-                zone_transform=self.zone_transform,
-                settings=self.settings,
-                until_arrival=False,
-            )
+            return drive(scenario, self.controller(scenario, self.settings), loop)
         except SzlibError as error:
             raise SolverError(
                 f"the controller failed in world {seed}: {error}; see worlds({seed})"
@@ -174,6 +110,69 @@ class RolloutSetup:
         except Exception as error:
             error.add_note(f"in world {seed}")
             raise
+
+
+def rollouts(
+    n: int,
+    setup: RolloutSetup | None = None,
+    *,
+    settings: MPCSettings | None = None,
+    seed: int = 0,
+    out: str | Path | None = None,
+    n_jobs: int = 1,
+    progress: bool = True,
+) -> pd.DataFrame:
+    """Drive through the worlds of seeds `seed` to `seed + n - 1`; one row of metrics for each.
+
+    Parameters
+    ----------
+    n : number of worlds.
+    setup : worlds, people, controller and measures; default: `RolloutSetup()`.
+    settings : settings of the controller and the loop, in place of those of `setup`.
+    seed : seed of the first world.
+    out : folder for finished chunks; a later call continues from them. Default: no files. The parameters and
+        szlib's version name a folder inside it. After a change of your own code choose another folder.
+    n_jobs : worlds at a time; -1: one for each core.
+    progress : show a progress bar.
+
+    Returns
+    -------
+    seed, and the columns of `szlib.simulation.compute_metrics`, sorted by seed.
+
+    Raises
+    ------
+    SolverError : `n` is not positive, the controller fails in a world (the error names the seed), or `out` is
+        given with a function that is defined inside another: it has no name that other processes know.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> setup = szlib.simulation.RolloutSetup(worlds=szlib.Worlds(duration=2.0))
+    >>> table = szlib.rollouts(2, setup, progress=False)
+    >>> table["seed"].tolist(), (table["unflagged_violations"] == 0).all()
+    ([0, 1], np.True_)
+    """
+    require(n >= 1, "n", n, "at least 1", SolverError)
+    setup = setup or RolloutSetup()
+    if settings is not None:
+        setup = replace(setup, settings=settings)
+    folder = None
+    if out is not None:
+        folder = Path(out) / setup.key()
+        claim_folder(folder.parent, PURPOSE)
+        claim_folder(folder, f"{PURPOSE} {setup.key()}")
+        write_file(folder / "parameters.txt", setup.describe() + "\n")
+    chunks = [
+        range(first, min(first + CHUNK_SIZE, seed + n))
+        for first in range(seed, seed + n, CHUNK_SIZE)
+    ]
+    tasks = [delayed(run_chunk)(setup, chunk, folder) for chunk in chunks]
+    tables: list[pd.DataFrame] = []
+    with tqdm(total=n, unit="world", disable=None if progress else True) as bar:
+        for table in run_tasks(tasks, n_jobs=n_jobs):
+            tables.append(table)
+            bar.update(len(table))
+    return pd.concat(tables).sort_values("seed", ignore_index=True)
 
 
 def identify(part: Any) -> str:
@@ -195,11 +194,6 @@ def identify(part: Any) -> str:
             f"{name} has no name that other processes know; define it in a module"
         )
     return name if kind is part else f"{name} {joblib.hash(part)}"
-
-
-def rerun_world(seed: int, **parameters: Any) -> SimulationLog:
-    """Drive through the world of a `seed` again, for its log; `parameters` as of `rollouts`."""
-    return RolloutSetup(**parameters).run(seed)
 
 
 def run_chunk(
@@ -227,3 +221,189 @@ def run_chunk(
         table.to_parquet(buffer)
         store_cached(file, buffer.getvalue(), key)
     return table
+
+
+# --- comparisons -------------------------------------------------------------------------------------
+
+HALL_PERSONAL = 1.2
+"""Largest personal distance [m] (Hall 1966)."""
+KIRBY_SPEED = 0.5
+"""Walking speed of Kirby's zone [m/s]: that of the people (paper, sec. 4)."""
+
+
+def keep_zone(fitted: Ellipse) -> Ellipse:
+    """The `fitted` ellipse itself."""
+    return fitted
+
+
+def use_body(fitted: Ellipse) -> Ellipse:
+    """A person's body (`BODY_ZONE`) in place of the `fitted` ellipse: a distance constraint."""
+    return BODY_ZONE
+
+
+def use_equal_circle(fitted: Ellipse) -> Ellipse:
+    """A circle around the person with the area of the `fitted` ellipse."""
+    radius = sqrt(fitted.area / pi)
+    return Ellipse((0.0, 0.0), (radius, radius))
+
+
+def use_hall_circle(fitted: Ellipse) -> Ellipse:
+    """Hall's personal distance in place of the `fitted` ellipse."""
+    return Ellipse((0.0, 0.0), (HALL_PERSONAL, HALL_PERSONAL))
+
+
+def use_kirby_ellipse(fitted: Ellipse) -> Ellipse:
+    """The smallest ellipse around `kirby_curve` at `KIRBY_SPEED`, in place of the `fitted` ellipse."""
+    return _fit_kirby_ellipse()
+
+
+def kirby_curve(angles: Array, speed: float) -> Array:
+    """The one-sigma line of Kirby's asymmetric Gaussian, shape (n, 2) [m].
+
+    Sigma is 2 v ahead, at least 1/2; 2/3 of this to the sides, and 1/2 of it behind.
+
+    Parameters
+    ----------
+    angles : directions, shape (n,) [rad].
+    speed : walking speed v [m/s].
+    """
+    ahead = max(2 * speed, 0.5)
+    x, y = np.cos(angles), np.sin(angles)
+    return np.column_stack([ahead * np.where(x > 0, x, x / 2), ahead * 2 / 3 * y])
+
+
+@lru_cache
+def _fit_kirby_ellipse() -> Ellipse:
+    return minimum_enclosing_ellipse_of_curve(
+        partial(kirby_curve, speed=KIRBY_SPEED), [-pi / 2, pi / 2]
+    )
+
+
+ZONES: dict[str, ZoneTransform] = {
+    "none": use_body,
+    "equal circle": use_equal_circle,
+    "Hall": use_hall_circle,
+    "Kirby": use_kirby_ellipse,
+    "fitted": keep_zone,
+}
+"""Zones that the robot keeps out of, by name."""
+
+FORMULATIONS: dict[str, MPCSettings] = {
+    "paper": MPCSettings.paper(),
+    "szlib": MPCSettings(),
+    "whole horizon": MPCSettings(N_h=MPCSettings.N),
+    "rest": MPCSettings(terminal="rest"),
+}
+"""Settings by name: the paper's to the letter, szlib's defaults, and two changes of them."""
+
+BEHAVIOURS: dict[str, Behaviour] = {
+    "as expected": Behaviour(),
+    "speeds up": Behaviour(pace=2.0),
+    "turns": Behaviour(turn=pi / 2),
+    "stops": Behaviour(pace=0.0),
+    "seen 10 cm off": Behaviour(noise=0.1),
+}
+"""How people move, or how the controller sees them, by name."""
+
+# columns of `compare` that name a method
+METHOD = ("controller", "zone", "formulation", "behaviour")
+
+WORLDS = Worlds(people=(3, 5), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=1.0)
+"""Worlds with space for each of the zones at the start and at the goal: the robot starts outside all."""
+
+
+def measure_time_inside(run: Run) -> dict[str, float]:
+    """Time for which the robot's disc of a `run` overlaps a zone of each kind, by Euclidean distance [s].
+
+    The fitted zones are those of the scenario's people, whatever zones the robot keeps out of.  People
+    without a zone in the scenario have the one that the robot keeps out of.
+    """
+    own = [person.zone for person in run.scenario.people] or [None] * len(run.zones)
+    fitted = [
+        as_ellipse(each or zone, run.settings.zone_speed)
+        for each, zone in zip(own, run.zones, strict=True)
+    ]
+    inside = {}
+    for name, zone in ZONES.items():
+        gaps = run.distances_to_zones(
+            [zone(each) for each in fitted], euclidean_to_ellipse
+        )
+        # NaN, of absent people, is no overlap
+        overlaps = (gaps < run.settings.r_robot).any(axis=1)
+        inside[f"inside {name}"] = run.settings.dt * float(overlaps.sum())
+    return inside
+
+
+def compare(
+    n: int,
+    *,
+    controllers: Sequence[str] | Mapping[str, ControllerFactory] = ("MPC-CBF",),
+    zones: Sequence[str] | Mapping[str, ZoneTransform] = tuple(ZONES),
+    formulations: Sequence[str] | Mapping[str, MPCSettings] = tuple(FORMULATIONS),
+    behaviours: Sequence[str] | Mapping[str, CrowdModel] = ("as expected",),
+    worlds: ScenarioSource = WORLDS,
+    **options: Any,
+) -> pd.DataFrame:
+    """Drive through the same n worlds with each combination of methods.
+
+    Parameters
+    ----------
+    n, worlds : as of `rollouts`.
+    options : `seed`, `out`, `n_jobs` and `progress` of `rollouts`.
+    controllers : names in `CONTROLLERS`, or a mapping from names of your own to controller factories.
+    zones : names in `ZONES`, or a mapping to zone transforms.
+    formulations : names in `FORMULATIONS`, or a mapping to settings.
+    behaviours : names in `BEHAVIOURS`, or a mapping to crowd models.
+
+    Returns
+    -------
+    The rows of `rollouts`, with the columns `METHOD` and the time in each of `ZONES`.
+
+    Raises
+    ------
+    SolverError : a name is unknown.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> worlds = szlib.Worlds(duration=1.0)
+    >>> table = szlib.simulation.compare(
+    ...     1, zones=["none", "fitted"], formulations=["szlib"], worlds=worlds, progress=False
+    ... )
+    >>> table[["zone", "formulation", "seed"]].to_numpy().tolist()
+    [['none', 'szlib', 0], ['fitted', 'szlib', 0]]
+    """
+    choices = [
+        _find_methods(controllers, CONTROLLERS),
+        _find_methods(zones, ZONES),
+        _find_methods(formulations, FORMULATIONS),
+        _find_methods(behaviours, BEHAVIOURS),
+    ]
+    tables = []
+    for controller, zone, formulation, behaviour in product(*choices):
+        setup = RolloutSetup(
+            settings=choices[2][formulation],
+            worlds=worlds,
+            behaviour=choices[3][behaviour],
+            controller=choices[0][controller],
+            zone_transform=choices[1][zone],
+            measure=measure_time_inside,
+        )
+        names = (controller, zone, formulation, behaviour)
+        table = rollouts(n, setup, **options)
+        tables.append(table.assign(**dict(zip(METHOD, names, strict=True))))
+    return pd.concat(tables, ignore_index=True)
+
+
+def _find_methods(
+    given: Sequence[str] | Mapping[str, Any], known: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    """Methods by name: those `given`, or those of the names given."""
+    if isinstance(given, Mapping):
+        return given
+    unknown = sorted(set(given) - set(known))
+    if unknown:
+        raise SolverError(
+            f"unknown names: {', '.join(unknown)}; expected {', '.join(known)}, or a mapping"
+        )
+    return {name: known[name] for name in given}

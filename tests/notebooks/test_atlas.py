@@ -10,7 +10,7 @@ from studies.atlas import CANNOT_START, REFERENCE, SCENES, AtlasCell, run_atlas
 
 import szlib
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.strategies import (
+from szlib.simulation.metrics import (
     MIN_RETREAT,
     STRATEGIES,
     classify_strategy,

@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Array
-from ..control.obstacles import Obstacles, barrier, ellipse_distance
-from ..control.people import Person
-from ..control.settings import MPCSettings
+from ..control import MPCSettings, Obstacles, Person, barrier, ellipse_distance
 from ..errors import DataError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
@@ -163,11 +161,8 @@ class Run:
             raise DataError(
                 f"the run has times from 0 to {self.time[-1]:g} s; got {time:g}"
             )
-        present = [
-            Person((x, y), (vx, vy), heading, zone)
-            for zone, (x, y, heading, vx, vy) in zip(
-                self.zones, self.people[row].tolist(), strict=True
-            )
-            if x == x
-        ]
+        present = list[Person]()
+        for i in np.flatnonzero(self.is_present[row]):
+            x, y, heading, vx, vy = self.people[row, i].tolist()
+            present.append(Person((x, y), (vx, vy), heading, self.zones[i]))
         return self.states[row], self.scenario.goal, present
