@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from studies.literature_zones import ZONES
 
 from szlib.errors import SolverError
-from szlib.simulation import METHOD, ZONES
+from szlib.simulation import METHOD
 
 METRICS = (
     "success",

@@ -41,7 +41,6 @@ from .monte_carlo import (
     ZONES,
     RolloutSetup,
     compare,
-    measure_time_inside,
     rollouts,
 )
 from .robot_run import Run

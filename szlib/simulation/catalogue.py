@@ -20,7 +20,7 @@ seconds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, pi, sin
+from math import atan2, cos, pi, sin
 
 import numpy as np
 
@@ -42,12 +42,6 @@ PASSING_DISTANCE = 1.0  # the robot passes a person who is within this distance 
 # below this fraction of its greatest speed the robot has slowed down (assumed)
 SLOW_FRACTION = 0.8
 MOUTH = 0.0  # x of the near end of the restricted pathway [m]
-
-_CORRIDOR = np.array([[(-6.0, y), (7.0, y)] for y in (2.3, -2.3)])
-_PATHWAY = np.array(
-    [[(MOUTH, y), (MOUTH + 3.0, y)] for y in (1.0, -1.0)]
-    + [[(MOUTH, y), (MOUTH, 4.0 * y)] for y in (1.0, -1.0)]
-)
 
 
 def _avoids_earlier_head_on(run: Run) -> tuple[bool, float]:
@@ -111,57 +105,6 @@ _OUT_FIRST = Claim(
 )
 _GOES_ON = Claim("The robot goes on to its goal.", _goes_on)
 
-_SCENARIOS = (
-    Scenario(
-        name="passing",
-        title="Passing a stationary person",
-        start=np.array([-4.0, 0.0, 0.0, 0.0]),
-        goal=np.array([4.0, 0.0]),
-        people=(Person((0.0, 0.0), heading=pi),),
-        claims=(
-            Claim(
-                "Avoidance starts farther away head-on than from behind.",
-                _avoids_earlier_head_on,
-            ),
-            Claim("Avoidance starts well before the zone.", _avoids_well_before),
-        ),
-    ),
-    Scenario(
-        name="corridor",
-        title="Avoiding a person in a narrow corridor",
-        start=np.array([-4.0, 0.0, 0.0, 0.0]),
-        goal=np.array([4.0, 0.0]),
-        people=(Person((4.0, 0.0), (-0.5, 0.0)),),
-        walls=_CORRIDOR,
-        claims=(Claim("The robot slows down while passing.", _slows_while_passing),),
-    ),
-    Scenario(
-        name="waiting",
-        title="Yielding in a restricted pathway (1): waiting",
-        start=np.array([-2.0, -1.5, 0.0, 0.0]),
-        goal=np.array([6.0, 0.0]),
-        people=(Person((4.0, 0.0), (-0.5, 0.0)),),
-        walls=_PATHWAY,
-        claims=(Claim("The robot waits.", _waits), _OUT_FIRST, _GOES_ON),
-    ),
-    Scenario(
-        name="making_room",
-        title="Yielding in a restricted pathway (2): making room",
-        start=np.array([1.2, 0.0, 0.0, 0.0]),
-        goal=np.array([6.0, 0.0]),
-        people=(Person((5.0, 0.0), (-0.5, 0.0)),),
-        walls=_PATHWAY,
-        claims=(
-            Claim("The robot is in the way and goes back to make room.", _makes_room),
-            _OUT_FIRST,
-            _GOES_ON,
-        ),
-    ),
-)
-
-SCENARIOS: dict[str, Scenario] = {scenario.name: scenario for scenario in _SCENARIOS}
-"""The scenarios of the paper, by name; another scenario is one more entry."""
-
 WALKING_SPEED = 0.5  # speed of people who walk [m/s] (paper, sec. 4)
 Place = tuple[float, float]
 
@@ -173,12 +116,17 @@ def _walker(at: Place, to: Place, speed: float = WALKING_SPEED) -> Person:
     return Person(at, (vx, vy))
 
 
-def _standing_person(at: Place, facing: Place) -> Person:
-    return Person(at, heading=float(np.arctan2(facing[1] - at[1], facing[0] - at[0])))
+def _hall(
+    half_width: float, begin: float = -8.0, end: float = 8.0
+) -> list[tuple[Place, Place]]:
+    """The two walls of a hall along x."""
+    return [((begin, y), (end, y)) for y in (half_width, -half_width)]
 
 
-def _hall(half_width: float) -> list[tuple[Place, Place]]:
-    return [((-8.0, y), (8.0, y)) for y in (half_width, -half_width)]
+def _door(half_width: float, end: float) -> list[tuple[Place, Place]]:
+    """The two walls beside a door at x = `MOUTH`; they end at y = `end` and -`end`."""
+    ends = ((half_width, end), (-half_width, -end))
+    return [((MOUTH, near), (MOUTH, far)) for near, far in ends]
 
 
 def _corner(x: float, y: float, right: float, up: float) -> list[tuple[Place, Place]]:
@@ -188,7 +136,7 @@ def _corner(x: float, y: float, right: float, up: float) -> list[tuple[Place, Pl
 
 def _circle(n: int, radius: float) -> list[Place]:
     """Places on a circle, one straight ahead."""
-    angles = [2 * pi * k / n for k in range(n)]
+    angles = np.arange(n) * 2 * pi / n
     return [(radius * cos(angle), radius * sin(angle)) for angle in angles]
 
 
@@ -199,56 +147,116 @@ def _crossing_walker(at: Place, distance: float = 0.7) -> Person:
     return _walker(at, (y * shift, -x * shift), 0.8)
 
 
-def _meeting(
+def _scene(
     name: str,
     title: str,
     people: Sequence[Person],
     walls: Sequence[tuple[Place, Place]] = (),
+    *,
     start: Place = (-5.0, 0.0),
+    goal: Place = (5.0, 0.0),
+    duration: float = 40.0,
+    claims: Sequence[Claim] = (),
 ) -> Scenario:
+    """A scenario of a robot that starts at rest."""
     return Scenario(
         name=name,
         title=title,
         start=np.array([*start, 0.0, 0.0]),
-        goal=np.array((5.0, 0.0)),
+        goal=np.array(goal),
         people=tuple(people),
-        walls=np.reshape(np.array(walls, float), (-1, 2, 2)),
-        duration=40.0,
+        walls=np.reshape(walls, (-1, 2, 2)),
+        duration=duration,
+        claims=tuple(claims),
     )
 
 
-_DOOR = [((0.0, y), (0.0, 6 * y)) for y in (0.9, -0.9)]
+_PATHWAY = [*_hall(1.0, MOUTH, MOUTH + 3.0), *_door(1.0, 4.0)]
+_SCENARIOS = (
+    _scene(
+        "passing",
+        "Passing a stationary person",
+        [Person((0.0, 0.0), heading=pi)],
+        start=(-4.0, 0.0),
+        goal=(4.0, 0.0),
+        duration=60.0,
+        claims=[
+            Claim(
+                "Avoidance starts farther away head-on than from behind.",
+                _avoids_earlier_head_on,
+            ),
+            Claim("Avoidance starts well before the zone.", _avoids_well_before),
+        ],
+    ),
+    _scene(
+        "corridor",
+        "Avoiding a person in a narrow corridor",
+        [Person((4.0, 0.0), (-0.5, 0.0))],
+        _hall(2.3, -6.0, 7.0),
+        start=(-4.0, 0.0),
+        goal=(4.0, 0.0),
+        duration=60.0,
+        claims=[Claim("The robot slows down while passing.", _slows_while_passing)],
+    ),
+    _scene(
+        "waiting",
+        "Yielding in a restricted pathway (1): waiting",
+        [Person((4.0, 0.0), (-0.5, 0.0))],
+        _PATHWAY,
+        start=(-2.0, -1.5),
+        goal=(6.0, 0.0),
+        duration=60.0,
+        claims=[Claim("The robot waits.", _waits), _OUT_FIRST, _GOES_ON],
+    ),
+    _scene(
+        "making_room",
+        "Yielding in a restricted pathway (2): making room",
+        [Person((5.0, 0.0), (-0.5, 0.0))],
+        _PATHWAY,
+        start=(1.2, 0.0),
+        goal=(6.0, 0.0),
+        duration=60.0,
+        claims=[
+            Claim("The robot is in the way and goes back to make room.", _makes_room),
+            _OUT_FIRST,
+            _GOES_ON,
+        ],
+    ),
+)
+
+SCENARIOS = {scenario.name: scenario for scenario in _SCENARIOS}
+"""The scenarios of the paper, by name; another scenario is one more entry."""
 
 _MEETINGS = (
-    _meeting(
+    _scene(
         "frontal approach",
         "A person comes straight towards the robot",
         [_walker((5.0, 0.0), (-5.0, 0.0))],
     ),
-    _meeting(
+    _scene(
         "pedestrian obstruction",
         "A person stands in the way",
-        [_standing_person((0.0, 0.0), (-1.0, 0.0))],
+        [Person((0.0, 0.0), heading=pi)],
         _hall(2.5),
     ),
-    _meeting(
+    _scene(
         "narrow hallway",
         "A person comes along a hallway 3.2 m wide, on their right",
         [_walker((6.0, 0.7), (-6.0, 0.7))],
         _hall(1.6),
     ),
-    _meeting(
+    _scene(
         "narrow doorway",
         "A person comes through a door 1.8 m wide",
         [_walker((2.5, 0.0), (-5.0, 0.0))],
-        _DOOR,
+        _door(0.9, 5.4),
     ),
-    _meeting(
+    _scene(
         "overtaking",
         "A person walks ahead, at 0.3 m/s",
         [_walker((-2.5, 0.0), (5.0, 0.0), 0.3)],
     ),
-    _meeting(
+    _scene(
         "intersection",
         "A person crosses where two halls meet",
         [_walker((0.0, -3.0), (0.0, 5.0))],
@@ -259,13 +267,13 @@ _MEETINGS = (
             for wall in _corner(x, y, x / 2, y / 2)
         ],
     ),
-    _meeting(
+    _scene(
         "blind corner",
         "A person comes from behind a corner",
         [_walker((1.0, 3.6), (1.0, -5.0), 0.7)],
         _corner(0.0, 1.3, -1, 1) + _corner(0.0, -1.3, -1, -1),
     ),
-    _meeting(
+    _scene(
         "parallel traffic",
         "People walk on both sides, one way and the other",
         [
@@ -273,7 +281,7 @@ _MEETINGS = (
             *(_walker((x, -1.7), (9.0, -1.7)) for x in (-3.5, -0.5)),
         ],
     ),
-    _meeting(
+    _scene(
         "perpendicular traffic",
         "People cross the way, from both sides",
         [
@@ -282,18 +290,18 @@ _MEETINGS = (
             _walker((2.5, -4.0), (2.5, 9.0)),
         ],
     ),
-    _meeting(
+    _scene(
         "circular crossing",
         "All people cross a circle, past its centre",
         [_crossing_walker(at) for at in _circle(6, 4.5) if at[0] > -4.0],
     ),
-    _meeting(
+    _scene(
         "robot crowding",
         "People stand around the robot",
-        [_standing_person(at, (0.0, 0.0)) for at in _circle(5, 2.6)],
+        [Person((x, y), heading=atan2(0.0 - y, 0.0 - x)) for x, y in _circle(5, 2.6)],
         start=(0.0, 0.0),
     ),
 )
 
-MEETINGS: dict[str, Scenario] = {meeting.name: meeting for meeting in _MEETINGS}
+MEETINGS = {meeting.name: meeting for meeting in _MEETINGS}
 """The meetings, by name; another meeting is one more entry."""

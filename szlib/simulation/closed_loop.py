@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import hypot
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..checks import Array
 from ..control import Controller, MPCSettings, Obstacle, Person, as_controller
@@ -113,7 +111,7 @@ def simulate(
             f"the controller knows {len(controller.walls)} walls, and not the {len(scenario.walls)} of "
             f"{scenario.name!r}; build it with walls=scenario.walls"
         )
-    known = getattr(controller, "obstacles", None)
+    known = controller.obstacles
     if known is not None and _list_numbers(known) != _list_numbers(scenario.obstacles):
         raise SolverError(
             f"the controller knows other obstacles than {scenario.name!r}: {list(known)}, and not "
@@ -161,7 +159,12 @@ def drive(
     """
     loop = loop or LoopSettings()
     controller = as_controller(controller)
-    settings, robot = _choose_settings(controller, loop.settings), controller.robot
+    settings = loop.settings or controller.settings or MPCSettings()
+    if controller.settings and controller.settings.dt != settings.dt:
+        raise SolverError(
+            f"the controller steps every {controller.settings.dt} s, the loop every {settings.dt} s; give one"
+        )
+    robot = controller.robot
     zone = BODY_ZONE if controller.zone is None else controller.zone
     people = _People(scenario, zone, loop, settings)
     recorder = _Recorder()
@@ -170,13 +173,15 @@ def drive(
     controller.reset()
     own = robot.start(scenario.start)
     for k in range(round(duration / settings.dt) + 1):
-        time, state = k * settings.dt, robot.body(own)
+        time = k * settings.dt
+        state = robot.body(own)
         everyone = people.locate(time, state)
-        seen, places = people.observe(everyone)
+        seen = people.observe(everyone)
         begin = perf_counter()
-        step = controller.step(own, scenario.goal, seen)
-        recorder.add(state, everyone, places, step, perf_counter() - begin)
-        if arrival is None and _is_at_rest_at(scenario.goal, state):
+        step = controller.step(own, scenario.goal, tuple(seen.values()))
+        recorder.add(state, everyone, list(seen), step, perf_counter() - begin)
+        is_near = np.hypot(*(state[:2] - scenario.goal)) <= GOAL_RADIUS
+        if arrival is None and is_near and np.hypot(*state[2:]) <= STOPPED_SPEED:
             arrival = k
             if loop.until_arrival:
                 break
@@ -196,23 +201,6 @@ def drive(
     )
 
 
-def _is_at_rest_at(goal: Array, state: Array) -> bool:
-    x, y, vx, vy = state.tolist()
-    distance = hypot(x - float(goal[0]), y - float(goal[1]))
-    return hypot(vx, vy) <= STOPPED_SPEED and distance <= GOAL_RADIUS
-
-
-def _choose_settings(
-    controller: Controller, settings: MPCSettings | None
-) -> MPCSettings:
-    own = controller.settings
-    if settings and own and settings.dt != own.dt:
-        raise SolverError(
-            f"the controller steps every {own.dt} s, the loop every {settings.dt} s; give one"
-        )
-    return settings or own or MPCSettings()
-
-
 class _People:
     """The people of a run with their zones, and what the controller sees of them.
 
@@ -226,7 +214,9 @@ class _People:
         loop: LoopSettings,
         settings: MPCSettings,
     ) -> None:
-        self._default, self._loop, self._speed = default, loop, settings.zone_speed
+        self._default = default
+        self._loop = loop
+        self._speed = settings.zone_speed
         self._zones: dict[int, Ellipse] = {}
         self._rng = np.random.default_rng([loop.seed, 2])
         people = tuple(
@@ -265,22 +255,19 @@ class _People:
                 "the number of people in a crowd must not change, use None for people who are absent; it was "
                 f"{self._n_people}, and now is {len(people)}"
             )
-        located = list[Person | None]()
-        for i, person in enumerate(people):
-            if person is not None and person.zone is not self._zones.get(i, self):
-                person = replace(person, zone=self._zone_of(i, person))
-            located.append(person)
-        return located
+        return [
+            p
+            if p is None or p.zone is self._zones.get(i, self)
+            else replace(p, zone=self._zone_of(i, p))
+            for i, p in enumerate(people)
+        ]
 
-    def observe(
-        self, everyone: Sequence[Person | None]
-    ) -> tuple[tuple[Person, ...], list[int]]:
-        """The people whom the controller sees, and the place of each among `everyone`."""
-        present = [i for i, p in enumerate(everyone) if p is not None]
-        true_people = tuple([p for p in everyone if p is not None])
-        observed = self._loop.behaviour.observe(true_people, self._rng)
-        places = [i for i, p in zip(present, observed, strict=True) if p is not None]
-        return tuple([p for p in observed if p is not None]), places
+    def observe(self, everyone: Sequence[Person | None]) -> dict[int, Person]:
+        """The people whom the controller sees, by their place among `everyone`."""
+        present = {i: p for i, p in enumerate(everyone) if p is not None}
+        observed = self._loop.behaviour.observe(tuple(present.values()), self._rng)
+        pairs = zip(present, observed, strict=True)
+        return {i: p for i, p in pairs if p is not None}
 
 
 class _Recorder:
@@ -289,7 +276,8 @@ class _Recorder:
     def __init__(self) -> None:
         self.controls: list[Array] = []
         self._states: list[Array] = []
-        self._people: list[float | None] = []
+        self._people: list[float] = []
+        self._headings: dict[int, float] = {}  # the last known of each person
         self._seen: list[list[int]] = []
         self._reported: dict[str, list[Any]] = {name: [] for name in _UNREPORTED}
 
@@ -301,14 +289,18 @@ class _Recorder:
         step: Any,
         duration: float,
     ) -> None:
-        """Record a `step`, which took a `duration` [s], with the places of the people `seen`."""
+        """Record a `step`, which took a `duration` [s], and the places of the people `seen`."""
         self._states.append(state)
         self.controls.append(np.asarray(step.control, float))
         self._seen.append(seen)
-        for p in everyone:
-            self._people += (
-                _ABSENT if p is None else (*p.position, p.heading, *p.velocity)
-            )
+        for i, person in enumerate(everyone):
+            if person is None:
+                self._people += _ABSENT
+                continue
+            if person.heading is not None:
+                self._headings[i] = person.heading
+            heading = self._headings.get(i, 0.0)
+            self._people += (*person.position, heading, *person.velocity)
         for name, column in self._reported.items():
             column.append(getattr(step, name, _UNREPORTED[name]))
         if self._reported["solve_time"][-1] is None:
@@ -317,14 +309,11 @@ class _Recorder:
     def collect(self, n_people: int, n_fixed: int) -> dict[str, Any]:
         """The arrays of the run, as of `Run`."""
         reported = self._reported
-        people = np.reshape(
-            np.array(self._people, float), (len(self._states), n_people, 5)
-        )
         numbers = ("slack", "solve_time", "stuck")
         return {
             "states": np.array(self._states),
             "controls": np.array(self.controls),
-            "people": _fill_headings(people),
+            "people": np.reshape(self._people, (len(self._states), n_people, 5)),
             "predicted": _stack_plans(reported["predicted"]),
             "residual": _align_residuals(
                 reported["residual"], self._seen, n_people, n_fixed
@@ -336,24 +325,12 @@ class _Recorder:
         }
 
 
-def _fill_headings(people: Array) -> Array:
-    """Replace missing headings of people who are present by their last known heading, or 0."""
-    headings, is_present = people[:, :, 2], ~np.isnan(people[:, :, 0])
-    if np.isnan(headings[is_present]).any():
-        known = pd.DataFrame(headings).ffill().fillna(0.0).to_numpy()
-        people[:, :, 2] = np.where(is_present, known, np.nan)
-    return people
-
-
 def _stack_plans(plans: Sequence[Array]) -> Array:
     """The plan of each step, shape (n, N+1, 4); (n, 0, 4) if there are none, NaN after shorter ones."""
-    longest = max(map(len, plans))
-    return np.array(
-        [
-            np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan)
-            for p in plans
-        ]
-    )
+    stacked = np.full((len(plans), max(map(len, plans)), 4), np.nan)
+    for row, plan in zip(stacked, plans, strict=True):
+        row[: len(plan)] = plan
+    return stacked
 
 
 def _align_residuals(

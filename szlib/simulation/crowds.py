@@ -88,25 +88,26 @@ class Behaviour:
         if self.pace == 1.0 and self.turn == 0.0:
             return lambda t, _: [person.after(t) for person in people]
         rng = np.random.default_rng([seed, 1])
-        plans = [
-            (p, rng.uniform(*self.between), self.turn * rng.choice([-1, 1]))
-            for p in people
+        changes = [self._draw_change(person, rng) for person in people]
+        return lambda t, _: [
+            person.after(t) if t <= time else changed.after(t - time)
+            for person, (time, changed) in zip(people, changes, strict=True)
         ]
-        return lambda t, _: [self._locate(t, *plan) for plan in plans]
 
-    def _locate(
-        self, t: float, person: Person, change_time: float, turn: float
-    ) -> Person:
-        if t <= change_time or person.stands:
-            return person.after(t)
+    def _draw_change(
+        self, person: Person, rng: np.random.Generator
+    ) -> tuple[float, Person]:
+        """When a person changes their velocity, and the person at that time, with the new one."""
+        time = rng.uniform(*self.between)
+        turn = self.turn * rng.choice([-1, 1])
+        if person.stands:
+            return time, person
         vx, vy = person.velocity
         heading = (atan2(vy, vx) if person.heading is None else person.heading) + turn
         speed = self.pace * hypot(vx, vy)
         velocity = (speed * cos(heading), speed * sin(heading))
-        position = person.after(change_time).position
-        return Person(position, velocity, heading, person.zone, person.id).after(
-            t - change_time
-        )
+        position = person.after(time).position
+        return time, Person(position, velocity, heading, person.zone, person.id)
 
     def observe(
         self, people: tuple[Person, ...], rng: np.random.Generator
@@ -248,20 +249,19 @@ class OrcaModel:
         for wall in walkers.walls:
             sim.add_obstacle(wall.tolist())
         sim.process_obstacles()
-        self._walkers, self._sim = walkers, sim
+        self._walkers = walkers
+        self._sim = sim
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
         """See `WalkingModel.velocities` for `positions`, `robot` and `dt`."""
-        w, sim, n = self._walkers, self._sim, len(positions)
+        w = self._walkers
+        sim = self._sim
+        n = len(positions)
         offset = w.goals - positions
         distance = np.hypot(*offset.T)
-        speed = np.minimum(
-            np.where(w.speeds > 0, w.speeds, STEP_ASIDE_SPEED), distance / dt
-        )
-        preferred = (
-            offset
-            * np.divide(speed, distance, out=np.zeros(n), where=distance > 0)[:, None]
-        )
+        fastest = np.where(w.speeds > 0, w.speeds, STEP_ASIDE_SPEED)
+        speed = np.minimum(fastest, distance / dt)
+        preferred = offset * (speed / np.maximum(distance, _SMALLEST))[:, None]
         for i in range(n):
             sim.set_agent_position(i, positions[i].tolist())
             sim.set_agent_pref_velocity(i, preferred[i].tolist())
@@ -300,7 +300,8 @@ class SocialForceModel:
         """See `WalkingModel.velocities` for `positions`, `robot` and `dt`."""
         speeds = self._walkers.speeds[:, None]
         course, distance = _normalise(self._walkers.goals - positions)
-        others, their_velocities = positions, self._velocities
+        others = positions
+        their_velocities = self._velocities
         if self._walkers.r_robot is not None:
             others = np.vstack([others, robot[:2]])
             their_velocities = np.vstack([their_velocities, robot[2:]])
@@ -327,7 +328,8 @@ def _push_apart(offset: Array, velocity: Array) -> Array:
     away, distance = _normalise(offset)
     along, size = _normalise(away - 2 * velocity)
     reach = REACH * np.maximum(size, _SMALLEST)
-    theta = _measure_angle(along) - _measure_angle(away)
+    theta = np.arctan2(along[..., 1:], along[..., :1])
+    theta = theta - np.arctan2(away[..., 1:], away[..., :1])
     left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
     push = np.exp(-distance / reach - (3 * reach * theta) ** 2)
     turn = np.sign(theta) * np.exp(-distance / reach - (2 * reach * theta) ** 2)
@@ -340,15 +342,13 @@ def _normalise(vectors: Array) -> tuple[Array, Array]:
     return vectors / np.maximum(length, _SMALLEST), length
 
 
-def _measure_angle(vectors: Array) -> Array:
-    return np.asarray(np.arctan2(vectors[..., 1:], vectors[..., :1]))
-
-
 def _list_points(wall: Array) -> Array:
     """Points of a wall, `POINTS_PER_METRE` of them; a short wall is lengthened to `MIN_WALL_LENGTH`."""
-    middle, half = wall.mean(axis=0), (wall[1] - wall[0]) / 2
+    middle = wall.mean(axis=0)
+    half = (wall[1] - wall[0]) / 2
     half = half * max(1.0, MIN_WALL_LENGTH / (2 * np.hypot(*half)))
-    first, last = middle - half, middle + half
+    first = middle - half
+    last = middle + half
     return np.linspace(
         first, last, int(np.linalg.norm(first - last) * POINTS_PER_METRE)
     )
@@ -392,15 +392,10 @@ class ReactingPeople(CrowdModel):
     r_robot: float = MPCSettings.r_robot
 
     def __post_init__(self) -> None:
-        models, appearances = ", ".join(WALKING_MODELS), get_args(RobotAppearance)
         is_model = callable(self.model) or self.model in WALKING_MODELS
-        require(
-            is_model,
-            "model",
-            self.model,
-            f"{models}, or make a model from walkers",
-            SolverError,
-        )
+        expected = f"{', '.join(WALKING_MODELS)}, or make a model from walkers"
+        require(is_model, "model", self.model, expected, SolverError)
+        appearances = get_args(RobotAppearance)
         expected = f"one of {', '.join(appearances)}"
         require(self.sees in appearances, "sees", self.sees, expected, SolverError)
         for name in ("pace", "jitter", "r_robot"):
@@ -418,35 +413,35 @@ class ReactingPeople(CrowdModel):
             decreases.
         """
         people = scenario.people
-        r_robot = {"robot": self.r_robot, "person": BODY_RADIUS, "nothing": None}[
-            self.sees
-        ]
-        goals = self._shifted_goals(scenario, np.random.default_rng([seed, 3]))
-        velocities = np.array([p.velocity for p in people]).reshape(-1, 2)
+        appearance = {"robot": self.r_robot, "person": BODY_RADIUS, "nothing": None}
+        states = np.reshape([(*p.position, *p.velocity) for p in people], (-1, 4))
+        positions = states[:, :2]
+        velocities = states[:, 2:]
         speeds = np.hypot(*velocities.T)
         if self.goals is not None:
             speeds = np.where(speeds > 0, speeds, self.pace)
-        positions = np.array([p.position for p in people]).reshape(-1, 2)
-        walkers = Walkers(positions, velocities, goals, speeds, scenario.walls, r_robot)
+        walkers = Walkers(
+            positions,
+            velocities,
+            goals=self._shift_goals(scenario, np.random.default_rng([seed, 3])),
+            speeds=speeds,
+            walls=scenario.walls,
+            r_robot=appearance[self.sees],
+        )
         make_model = self.model if callable(self.model) else WALKING_MODELS[self.model]
         return _ReactingCrowd(people, walkers, make_model(walkers))
 
-    def _shifted_goals(self, scenario: Scenario, rng: np.random.Generator) -> Array:
+    def _shift_goals(self, scenario: Scenario, rng: np.random.Generator) -> Array:
         people = scenario.people
+        goals = self.goals
+        if goals is None:
+            goals = tuple(p.after(scenario.duration).position for p in people)
+        expected = f"a goal for each of {len(people)} people"
+        require(len(goals) == len(people), "goals", goals, expected, SolverError)
+        shift = rng.normal(0.0, self.jitter, (len(people), 2))
         if self.goals is None:
-            goals = [person.after(scenario.duration).position for person in people]
-        else:
-            goals = list(self.goals)
-        if len(goals) != len(people):
-            raise SolverError(
-                f"expected a goal for each of {len(people)} people; got {len(goals)}"
-            )
-        unshifted = check_array("goals", np.reshape(goals, (-1, 2)), (len(people), 2))
-        stay = np.array(
-            [self.goals is None and person.stands for person in people], bool
-        )
-        shift = rng.normal(0.0, self.jitter, unshifted.shape)
-        return unshifted + np.where(stay[:, None], 0.0, shift)
+            shift[[person.stands for person in people]] = 0.0
+        return check_array("goals", np.reshape(goals, (-1, 2)), shift.shape) + shift
 
 
 class _ReactingCrowd:
@@ -455,9 +450,11 @@ class _ReactingCrowd:
     def __init__(
         self, people: tuple[Person, ...], walkers: Walkers, model: WalkingModel
     ) -> None:
-        self._people, self._model = people, model
+        self._people = people
+        self._model = model
         self._positions = walkers.positions.copy()
-        self._time, self._robot = 0.0, np.zeros(4)
+        self._time = 0.0
+        self._robot = np.zeros(4)
 
     def __call__(self, t: float, robot: Array) -> tuple[Person, ...]:
         if t < self._time:
@@ -468,22 +465,21 @@ class _ReactingCrowd:
             dt = round(t - self._time, 9)
             velocities = self._model.velocities(self._positions, self._robot, dt)
             self._positions += dt * velocities
-            pairs = zip(
-                self._people, self._positions.tolist(), velocities.tolist(), strict=True
-            )
-            self._people = tuple(_move(*each) for each in pairs)
-        self._time, self._robot = t, np.array(robot, float)
+            motions = zip(self._positions.tolist(), velocities.tolist(), strict=True)
+            people = []
+            for person, (position, velocity) in zip(self._people, motions, strict=True):
+                heading = person.heading
+                if hypot(*velocity) >= MIN_HEADING_SPEED:
+                    heading = atan2(velocity[1], velocity[0])
+                moved = replace(
+                    person,
+                    position=position,
+                    velocity=velocity,
+                    heading=heading,
+                    heading_unknown=heading is None,
+                )
+                people.append(moved)
+            self._people = tuple(people)
+        self._time = t
+        self._robot = np.array(robot, float)
         return self._people
-
-
-def _move(person: Person, at: list[float], velocity: list[float]) -> Person:
-    """The person at another position; below `MIN_HEADING_SPEED` they keep their heading."""
-    (x, y), (vx, vy) = at, velocity
-    heading = atan2(vy, vx) if hypot(vx, vy) >= MIN_HEADING_SPEED else person.heading
-    return replace(
-        person,
-        position=(x, y),
-        velocity=(vx, vy),
-        heading=heading,
-        heading_unknown=heading is None,
-    )

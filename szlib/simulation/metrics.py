@@ -101,12 +101,15 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     -----
     A step counts if its control is applied.  The step of the last state does not count.
     """
-    dt, n_people, way, applied = (
-        run.settings.dt,
-        len(run.zones),
-        run.until_arrival,
-        slice(0, -1),
-    )
+    dt = run.settings.dt
+    n_people = len(run.zones)
+    way = run.until_arrival
+    applied = slice(0, -1)
+    parts = {
+        "": slice(None),
+        "_people": slice(n_people),
+        "_walls": slice(n_people, None),
+    }
     speed = run.speed[way]
     time = dt * np.arange(len(speed))
     jerk = np.diff(np.diff(run.states[way, 2:], axis=0), axis=0) / dt**2
@@ -124,12 +127,11 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "outcome": classify_outcome(run),
         "time_to_goal": np.nan if run.arrival is None else round(dt * run.arrival, 9),
         "path_length": measure_path_length(run.states[way, :2]),
-        "min_h": _min_or_nan(run.h),
-        "min_h_people": _min_or_nan(run.h[:, :n_people]),
-        "min_h_walls": _min_or_nan(run.h[:, n_people:]),
-        "min_clearance": _min_or_nan(run.clearance),
-        "min_clearance_people": _min_or_nan(run.clearance[:, :n_people]),
-        "min_clearance_walls": _min_or_nan(run.clearance[:, n_people:]),
+        **{f"min_h{of}": _min_or_nan(run.h[:, part]) for of, part in parts.items()},
+        **{
+            f"min_clearance{of}": _min_or_nan(run.clearance[:, part])
+            for of, part in parts.items()
+        },
         "min_speed": float(
             speed[(time >= START_UP_TIME) & cruising].min(initial=speed.max())
         ),
@@ -228,7 +230,8 @@ def find_avoidance_start(
     -------
     (distance, h) [m], interpolated between two states; NaN if the robot stays on the line.
     """
-    start, course = run.scenario.start[:2], run.scenario.goal - run.scenario.start[:2]
+    start = run.scenario.start[:2]
+    course = run.scenario.goal - run.scenario.start[:2]
     beside = run.states[:, :2] - start
     beside = np.abs(beside[:, 0] * course[1] - beside[:, 1] * course[0]) / np.hypot(
         *course
@@ -236,16 +239,13 @@ def find_avoidance_start(
     rows = np.flatnonzero(beside > deviation)
     if not len(rows):
         return np.nan, np.nan
-    last, first = max(int(rows[0]) - 1, 0), int(rows[0])
-    share = (
-        (deviation - beside[last]) / (beside[first] - beside[last])
-        if first > last
-        else 1.0
-    )
-    ahead, left = locate_along_course(run, person)
-    x, y, h = (
-        v[last] + share * (v[first] - v[last]) for v in (ahead, left, run.h[:, person])
-    )
+    first = int(rows[0])
+    last = max(first - 1, 0)
+    share = 1.0
+    if first > last:
+        share = (deviation - beside[last]) / (beside[first] - beside[last])
+    values = np.stack([*locate_along_course(run, person), run.h[:, person]])
+    x, y, h = values[:, last] + share * (values[:, first] - values[:, last])
     return float(np.hypot(x, y)), float(h)
 
 
@@ -296,9 +296,10 @@ def _has_free_path(run: Run) -> bool:
         x, y, heading = run.people[-1, i, :3].tolist()
         zones.append(Zone(*Zone.place(run.zones[i], (x, y), heading, (0.0, 0.0))))
     ends = np.array([run.states[-1, :2], run.scenario.goal])
-    bodies = run.people[-1, run.is_present[-1], :2]
-    everything = np.vstack([ends, bodies, run.scenario.walls.reshape(-1, 2)])
-    low, high = everything.min(axis=0) - _MARGIN, everything.max(axis=0) + _MARGIN
+    places = [ends, run.people[-1, :, :2], run.scenario.walls.reshape(-1, 2)]
+    everything = np.vstack(places)
+    low = np.nanmin(everything, axis=0) - _MARGIN
+    high = np.nanmax(everything, axis=0) + _MARGIN
     axes = [np.arange(low[i], high[i], _CELL) for i in range(2)]
     cells = np.meshgrid(*axes, indexing="ij")
     obstacles = Obstacles.of([*zones, *run.scenario.fixed], run.settings)

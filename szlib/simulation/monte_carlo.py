@@ -7,12 +7,7 @@ Worlds run in parallel.  Each chunk of worlds is one Parquet file, written atomi
 the parameters: an interrupted call continues where it stopped, and a larger `n` adds chunks.
 
 `compare` drives with each combination of controllers, zones, formulations and behaviours through the same
-worlds.  Each zone of the literature is an `Ellipse` in the person's frame, made from the fitted one where it
-depends on it.  Each behaviour violates one expectation of the controller.
-
-Sources: E. T. Hall, "The Hidden Dimension", 1966 (personal distance up to 1.2 m); R. Kirby, R. Simmons,
-J. Forlizzi, "COMPANION: A constraint-optimizing method for person-acceptable navigation", RO-MAN 2009
-(asymmetric Gaussian).
+worlds.  Each behaviour violates one expectation of the controller.
 """
 
 from __future__ import annotations
@@ -21,7 +16,6 @@ import hashlib
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache, partial
 from itertools import product
 from math import pi, sqrt
 from pathlib import Path
@@ -29,20 +23,17 @@ from types import FunctionType
 from typing import Any
 
 import joblib
-import numpy as np
 import pandas as pd
 from joblib import delayed
 from tqdm import tqdm
 
 from .. import __version__
-from ..checks import Array, require
-from ..control import MPCSettings, euclidean_to_ellipse
-from ..control.people import as_ellipse
+from ..checks import require
+from ..control import MPCSettings
 from ..errors import SolverError, SzlibError
 from ..files import claim_folder, load_cached, store_cached, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
-from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
 from .baseline_controllers import CONTROLLERS, ControllerFactory, make_mpc_cbf
 from .closed_loop import BODY_ZONE, LoopSettings, ZoneTransform, drive
 from .crowds import UNAFFECTED, Behaviour, CrowdModel
@@ -162,10 +153,8 @@ def rollouts(
         claim_folder(folder.parent, PURPOSE)
         claim_folder(folder, f"{PURPOSE} {setup.key()}")
         write_file(folder / "parameters.txt", setup.describe() + "\n")
-    chunks = [
-        range(first, min(first + CHUNK_SIZE, seed + n))
-        for first in range(seed, seed + n, CHUNK_SIZE)
-    ]
+    seeds = range(seed, seed + n)
+    chunks = [seeds[i : i + CHUNK_SIZE] for i in range(0, n, CHUNK_SIZE)]
     tasks = [delayed(run_chunk)(setup, chunk, folder) for chunk in chunks]
     tables: list[pd.DataFrame] = []
     with tqdm(total=n, unit="world", disable=None if progress else True) as bar:
@@ -202,33 +191,31 @@ def run_chunk(
     """The rows of the worlds of `seeds` with a `setup`: read from `folder` if finished, else driven and
     stored.
     """
-    file = (
-        None
-        if folder is None
-        else folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
-    )
-    key = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
-    if file is not None and (content := load_cached(file, key)) is not None:
-        return pd.read_parquet(io.BytesIO(content))
+    if folder is None:
+        return _drive_worlds(setup, seeds)
+    file = folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
+    key = {"rollouts": setup.describe(), "seeds": [seeds.start, seeds.stop]}
+    content = load_cached(file, key)
+    if content is None:
+        buffer = io.BytesIO()
+        _drive_worlds(setup, seeds).to_parquet(buffer)
+        content = buffer.getvalue()
+        store_cached(file, content, key)
+    return pd.read_parquet(io.BytesIO(content))
+
+
+def _drive_worlds(setup: RolloutSetup, seeds: range) -> pd.DataFrame:
     rows = []
     for seed in seeds:
         log = setup.run(seed)
-        more = {} if setup.measure is None else setup.measure(log)
-        rows.append({"seed": seed, **log.metrics(), **more})
-    table = pd.DataFrame(rows)
-    if file is not None:
-        buffer = io.BytesIO()
-        table.to_parquet(buffer)
-        store_cached(file, buffer.getvalue(), key)
-    return table
+        row = {"seed": seed, **log.metrics()}
+        if setup.measure is not None:
+            row |= setup.measure(log)
+        rows.append(row)
+    return pd.DataFrame(rows)
 
 
 # --- comparisons -------------------------------------------------------------------------------------
-
-HALL_PERSONAL = 1.2
-"""Largest personal distance [m] (Hall 1966)."""
-KIRBY_SPEED = 0.5
-"""Walking speed of Kirby's zone [m/s]: that of the people (paper, sec. 4)."""
 
 
 def keep_zone(fitted: Ellipse) -> Ellipse:
@@ -247,43 +234,9 @@ def use_equal_circle(fitted: Ellipse) -> Ellipse:
     return Ellipse((0.0, 0.0), (radius, radius))
 
 
-def use_hall_circle(fitted: Ellipse) -> Ellipse:
-    """Hall's personal distance in place of the `fitted` ellipse."""
-    return Ellipse((0.0, 0.0), (HALL_PERSONAL, HALL_PERSONAL))
-
-
-def use_kirby_ellipse(fitted: Ellipse) -> Ellipse:
-    """The smallest ellipse around `kirby_curve` at `KIRBY_SPEED`, in place of the `fitted` ellipse."""
-    return _fit_kirby_ellipse()
-
-
-def kirby_curve(angles: Array, speed: float) -> Array:
-    """The one-sigma line of Kirby's asymmetric Gaussian, shape (n, 2) [m].
-
-    Sigma is 2 v ahead, at least 1/2; 2/3 of this to the sides, and 1/2 of it behind.
-
-    Parameters
-    ----------
-    angles : directions, shape (n,) [rad].
-    speed : walking speed v [m/s].
-    """
-    ahead = max(2 * speed, 0.5)
-    x, y = np.cos(angles), np.sin(angles)
-    return np.column_stack([ahead * np.where(x > 0, x, x / 2), ahead * 2 / 3 * y])
-
-
-@lru_cache
-def _fit_kirby_ellipse() -> Ellipse:
-    return minimum_enclosing_ellipse_of_curve(
-        partial(kirby_curve, speed=KIRBY_SPEED), [-pi / 2, pi / 2]
-    )
-
-
 ZONES: dict[str, ZoneTransform] = {
     "none": use_body,
     "equal circle": use_equal_circle,
-    "Hall": use_hall_circle,
-    "Kirby": use_kirby_ellipse,
     "fitted": keep_zone,
 }
 """Zones that the robot keeps out of, by name."""
@@ -305,6 +258,9 @@ BEHAVIOURS: dict[str, Behaviour] = {
 }
 """How people move, or how the controller sees them, by name."""
 
+# Names of methods, or methods by names of the user's own.
+Methods = Sequence[str] | Mapping[str, Any]
+
 # columns of `compare` that name a method
 METHOD = ("controller", "zone", "formulation", "behaviour")
 
@@ -312,43 +268,23 @@ WORLDS = Worlds(people=(3, 5), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min
 """Worlds with space for each of the zones at the start and at the goal: the robot starts outside all."""
 
 
-def measure_time_inside(run: Run) -> dict[str, float]:
-    """Time for which the robot's disc of a `run` overlaps a zone of each kind, by Euclidean distance [s].
-
-    The fitted zones are those of the scenario's people, whatever zones the robot keeps out of.  People
-    without a zone in the scenario have the one that the robot keeps out of.
-    """
-    own = [person.zone for person in run.scenario.people] or [None] * len(run.zones)
-    fitted = [
-        as_ellipse(each or zone, run.settings.zone_speed)
-        for each, zone in zip(own, run.zones, strict=True)
-    ]
-    inside = {}
-    for name, zone in ZONES.items():
-        gaps = run.distances_to_zones(
-            [zone(each) for each in fitted], euclidean_to_ellipse
-        )
-        # NaN, of absent people, is no overlap
-        overlaps = (gaps < run.settings.r_robot).any(axis=1)
-        inside[f"inside {name}"] = run.settings.dt * float(overlaps.sum())
-    return inside
-
-
 def compare(
     n: int,
     *,
-    controllers: Sequence[str] | Mapping[str, ControllerFactory] = ("MPC-CBF",),
-    zones: Sequence[str] | Mapping[str, ZoneTransform] = tuple(ZONES),
-    formulations: Sequence[str] | Mapping[str, MPCSettings] = tuple(FORMULATIONS),
-    behaviours: Sequence[str] | Mapping[str, CrowdModel] = ("as expected",),
+    controllers: Methods = ("MPC-CBF",),
+    zones: Methods = tuple(ZONES),
+    formulations: Methods = tuple(FORMULATIONS),
+    behaviours: Methods = ("as expected",),
     worlds: ScenarioSource = WORLDS,
+    measure: Measure | None = None,
     **options: Any,
 ) -> pd.DataFrame:
     """Drive through the same n worlds with each combination of methods.
 
     Parameters
     ----------
-    n, worlds : as of `rollouts`.
+    n : number of worlds.
+    worlds, measure : as of `RolloutSetup`.
     options : `seed`, `out`, `n_jobs` and `progress` of `rollouts`.
     controllers : names in `CONTROLLERS`, or a mapping from names of your own to controller factories.
     zones : names in `ZONES`, or a mapping to zone transforms.
@@ -357,7 +293,7 @@ def compare(
 
     Returns
     -------
-    The rows of `rollouts`, with the columns `METHOD` and the time in each of `ZONES`.
+    The rows of `rollouts`, with the columns `METHOD`.
 
     Raises
     ------
@@ -387,7 +323,7 @@ def compare(
             behaviour=choices[3][behaviour],
             controller=choices[0][controller],
             zone_transform=choices[1][zone],
-            measure=measure_time_inside,
+            measure=measure,
         )
         names = (controller, zone, formulation, behaviour)
         table = rollouts(n, setup, **options)
@@ -395,9 +331,7 @@ def compare(
     return pd.concat(tables, ignore_index=True)
 
 
-def _find_methods(
-    given: Sequence[str] | Mapping[str, Any], known: Mapping[str, Any]
-) -> Mapping[str, Any]:
+def _find_methods(given: Methods, known: Mapping[str, Any]) -> Mapping[str, Any]:
     """Methods by name: those `given`, or those of the names given."""
     if isinstance(given, Mapping):
         return given

@@ -150,18 +150,19 @@ class Variations:
         rng = np.random.default_rng(seed)
         start = self.scenario.start.copy()
         start[:2] += rng.uniform(-self.shift, self.shift, 2)
-        people = tuple(self._vary(person, rng) for person in self.scenario.people)
-        return replace(self.scenario, start=start, people=people)
-
-    def _vary(self, person: Person, rng: np.random.Generator) -> Person:
-        (x, y), (dx, dy) = (
-            person.position,
-            rng.uniform(-self.shift, self.shift, 2).tolist(),
-        )
-        factor = rng.uniform(*self.pace)
-        velocity = (factor * person.velocity[0], factor * person.velocity[1])
-        zone = person.zone if self.zone is None else self.zone
-        return replace(person, position=(x + dx, y + dy), velocity=velocity, zone=zone)
+        people = []
+        for person in self.scenario.people:
+            shift = rng.uniform(-self.shift, self.shift, 2)
+            factor = rng.uniform(*self.pace)
+            people.append(
+                replace(
+                    person,
+                    position=np.add(person.position, shift),
+                    velocity=np.multiply(factor, person.velocity),
+                    zone=self.zone or person.zone,
+                )
+            )
+        return replace(self.scenario, start=start, people=tuple(people))
 
 
 @dataclass(frozen=True)
@@ -213,24 +214,15 @@ class Worlds:
 
     def __post_init__(self) -> None:
         for name in ("people", "pace", "wall_length", "travel"):
-            low, high = getattr(self, name)
-            require(
-                0 <= low <= high < np.inf,
-                name,
-                (low, high),
-                "a range 0 <= low <= high",
-                SolverError,
-            )
-        for name, value in (("standing", self.standing), ("walls", self.walls)):
+            low, high = value = getattr(self, name)
+            is_range = 0 <= low <= high < np.inf
+            require(is_range, name, value, "a range 0 <= low <= high", SolverError)
+        for name in ("standing", "walls"):
+            value = getattr(self, name)
             require(0 <= value <= 1, name, value, "a fraction in [0, 1]", SolverError)
         for name in ("max_walls", "size", "duration"):
-            require(
-                0 < getattr(self, name) < np.inf,
-                name,
-                getattr(self, name),
-                "positive",
-                SolverError,
-            )
+            value = getattr(self, name)
+            require(0 < value < np.inf, name, value, "positive", SolverError)
 
     def __call__(self, seed: int) -> Scenario:
         """The world of a `seed`: the same one each time, whatever controller drives in it.
@@ -253,7 +245,8 @@ class Worlds:
             walls = _draw_walls(rng, self)
             people = _draw_people(rng, self, walls, zone)
             start, goal = rng.uniform(-self.size / 2, self.size / 2, (2, 2))
-            speed, heading = self.start_speed * rng.uniform(), rng.uniform(-pi, pi)
+            speed = self.start_speed * rng.uniform()
+            heading = rng.uniform(-pi, pi)
             if not shortest <= np.hypot(*(goal - start)) <= longest:
                 continue
             world = Scenario(
@@ -273,21 +266,20 @@ class Worlds:
 
     def _has_space(self, world: Scenario, zone: Ellipse) -> bool:
         """True if h >= `min_h` at the start, where full braking ends, and at the goal."""
-        zones, standing = list[Zone](), list[Zone]()
-        for person in world.people:
-            heading = person.heading or 0.0
-            placed = Zone.place(zone, person.position, heading, person.velocity)
-            zones.append(Zone(*placed))
-            if person.stands:
-                standing.append(zones[-1])
+        zones = [
+            Zone(*Zone.place(zone, p.position, p.heading or 0.0, p.velocity))
+            for p in world.people
+        ]
         margins = [required_margin(wall, _ROBOT.r_robot) for wall in world.walls]
         robot = replace(_ROBOT, eps=max([_ROBOT.eps, *margins]), margin="paper")
-        moving = Obstacles.of([*zones, *world.fixed], robot)
-        resting = Obstacles.of([*standing, *world.fixed], robot)
-        start, velocity = world.start[:2], world.start[2:]
+        start = world.start[:2]
+        velocity = world.start[2:]
         stop = start + velocity * np.hypot(*velocity) / (2 * _ROBOT.a_max)
-        h = [*moving.h(*start), *moving.h(*stop), *resting.h(*world.goal)]
-        return min(h, default=np.inf) >= self.min_h
+        places = np.array([start, stop, world.goal])
+        h = Obstacles.of([*zones, *world.fixed], robot).h(*places.T)
+        walks = [not person.stands for person in world.people]
+        h[: len(zones)][walks, 2] = np.inf  # they leave the goal
+        return bool(h.min(initial=np.inf) >= self.min_h)
 
 
 ONE_PERSON = Worlds(people=(1, 1), walls=0.0, start_speed=0.0, min_h=0.3)
@@ -308,7 +300,8 @@ def _draw_walls(rng: np.random.Generator, w: Worlds) -> Array:
         else 0
     )
     middle = rng.uniform(-w.size / 2, w.size / 2, (count, 2))
-    angle, half = rng.uniform(0, pi, count), rng.uniform(*w.wall_length, count) / 2
+    angle = rng.uniform(0, pi, count)
+    half = rng.uniform(*w.wall_length, count) / 2
     along = half[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     return np.stack([middle - along, middle + along], axis=1)
 
@@ -318,20 +311,19 @@ def _draw_people(
 ) -> list[Person]:
     """People one by one, clear of the walls and of each other; fewer where there is no space."""
     people: list[Person] = []
-    times, ends = w.duration * _FRACTIONS, walls.reshape(-1, 4).T
+    times = w.duration * _FRACTIONS
+    ends = walls.reshape(-1, 4).T
     for _ in range(int(rng.integers(*w.people, endpoint=True))):
         for _ in range(100):
             x, y = rng.uniform(-w.size / 2, w.size / 2, 2).tolist()
             heading = rng.uniform(-pi, pi)
             pace = 0.0 if rng.uniform() < w.standing else rng.uniform(*w.pace)
-            vx, vy = pace * cos(heading), pace * sin(heading)
+            vx = pace * cos(heading)
+            vy = pace * sin(heading)
             if any(dist((x, y), other.position) < 2 * BODY_RADIUS for other in people):
                 continue
             path = x + vx * times, y + vy * times
-            if (
-                not len(walls)
-                or (euclidean_segment_formula(*path, *ends) >= BODY_RADIUS).all()
-            ):
+            if (euclidean_segment_formula(*path, *ends) >= BODY_RADIUS).all():
                 people.append(Person((x, y), (vx, vy), heading, zone))
                 break
     return people
