@@ -46,11 +46,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
-from studies import comparison
+from studies import comparison, literature_zones
+from studies.literature_zones import ZONES, compare
 from studies.summaries import summarise
 
-from szlib.simulation import monte_carlo
-from szlib.simulation.monte_carlo import BEHAVIOURS, FORMULATIONS, WORLDS, ZONES, compare
+from szlib.simulation.monte_carlo import BEHAVIOURS, FORMULATIONS, WORLDS
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, NotebookRecord, parameters
 
@@ -63,8 +63,8 @@ parameters(
         ("people", WORLDS.people, ASSUMED, f"half of them stand; in {WORLDS.size:g} m x {WORLDS.size:g} m"),
         ("walls", WORLDS.walls, ASSUMED, "share of worlds that have some"),
         ("least h at the start [m]", WORLDS.min_h, ASSUMED, "outside every zone that is compared"),
-        ("Hall's radius [m]", monte_carlo.HALL_PERSONAL, ASSUMED, "far end of the personal distance"),
-        ("Kirby's walking speed [m/s]", monte_carlo.KIRBY_SPEED, ASSUMED, "that of the people"),
+        ("Hall's radius [m]", literature_zones.HALL_PERSONAL, ASSUMED, "far end of the personal distance"),
+        ("Kirby's walking speed [m/s]", literature_zones.KIRBY_SPEED, ASSUMED, "that of the people"),
     ]
 )
 

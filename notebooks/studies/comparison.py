@@ -16,8 +16,9 @@ import pandas as pd
 from studies import summaries
 from studies.atlas import REFERENCE
 from studies.committed import write_table
+from studies.literature_zones import compare
 
-from szlib.simulation.monte_carlo import BEHAVIOURS, FORMULATIONS, WORLDS, compare
+from szlib.simulation.monte_carlo import BEHAVIOURS, FORMULATIONS, WORLDS
 
 RIVAL = {"zone": "equal circle"}
 """The method against which zones are compared world by world."""

@@ -11,11 +11,10 @@ baseline_controllers  controllers to compare with: `CONTROLLERS`
 monte_carlo           thousands of random worlds, in parallel; comparisons: `rollouts`, `compare`
 """
 
-from .baseline_controllers import CONTROLLERS, BaselineController, make_mpc_cbf
+from .baseline_controllers import CONTROLLERS, make_mpc_cbf
 from .catalogue import MEETINGS, SCENARIOS
-from .closed_loop import BODY_ZONE, LoopSettings, drive, simulate
+from .closed_loop import LoopSettings, drive, simulate
 from .crowds import (
-    UNAFFECTED,
     WALKING_MODELS,
     Behaviour,
     Crowd,

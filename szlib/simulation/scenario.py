@@ -153,12 +153,12 @@ class Variations:
         people = []
         for person in self.scenario.people:
             shift = rng.uniform(-self.shift, self.shift, 2)
-            factor = rng.uniform(*self.pace)
+            velocity = np.multiply(rng.uniform(*self.pace), person.velocity)
             people.append(
                 replace(
                     person,
-                    position=np.add(person.position, shift),
-                    velocity=np.multiply(factor, person.velocity),
+                    position=np.add(person.position, shift).tolist(),
+                    velocity=velocity.tolist(),
                     zone=self.zone or person.zone,
                 )
             )

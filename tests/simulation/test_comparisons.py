@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
+from studies.literature_zones import ZONES, compare, kirby_curve, measure_time_inside
 from studies.summaries import summarise
 
 import szlib
@@ -11,11 +12,7 @@ from szlib.simulation.monte_carlo import (
     BEHAVIOURS,
     FORMULATIONS,
     WORLDS,
-    ZONES,
     RolloutSetup,
-    compare,
-    kirby_curve,
-    measure_time_inside,
 )
 
 FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
@@ -73,7 +70,7 @@ def test_compare_is_paired():
     with pytest.raises(
         szlib.SolverError, match="unknown names: Hull; expected none, equal circle"
     ):
-        compare(1, zones=("Hull",))
+        szlib.compare(1, zones=("Hull",))
 
 
 def table(**columns):
