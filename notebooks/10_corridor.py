@@ -51,7 +51,7 @@ from studies import scenario_runs
 from studies.atlas import AtlasCell
 
 import szlib
-from szlib.simulation.strategies import classify_strategy
+from szlib.simulation.metrics import classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 

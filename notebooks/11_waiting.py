@@ -55,8 +55,7 @@ from studies import chains, scenario_runs
 from studies.atlas import AtlasCell
 
 import szlib
-from szlib.simulation.metrics import find_yielding_steps
-from szlib.simulation.strategies import classify_strategy
+from szlib.simulation.metrics import classify_strategy, find_yielding_steps
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 

@@ -51,7 +51,7 @@ from IPython.display import Markdown, display
 
 import szlib
 from szlib.control import ways
-from szlib.simulation.closed_loop import drive
+from szlib.simulation.closed_loop import LoopSettings, drive
 from szlib.simulation.scenario import Scenario
 from szlib.workbook import figures
 from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters, read_table
@@ -85,7 +85,7 @@ def drive_both(goal, people=(), walls=(), speed=0.0, title="A meeting", others=(
     scene = Scenario("scene", start, np.array(goal), people, walls, title=title, duration=40.0)
     each = {"paper": paper, "among people": among, **dict(others)}
     robots = {name: szlib.MPCCBF(zone, walls=walls, settings=settings) for name, settings in each.items()}
-    return {name: drive(scene, robot, until_arrival=True) for name, robot in robots.items()}
+    return {name: drive(scene, robot, LoopSettings(until_arrival=True)) for name, robot in robots.items()}
 
 
 # %% jupyter={"source_hidden": true}

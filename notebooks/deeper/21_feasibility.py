@@ -56,7 +56,8 @@ from studies.distances import euclidean_to_segment
 
 import szlib
 from szlib.control.controller import advance
-from szlib.simulation.closed_loop import drive
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.monte_carlo import RolloutSetup
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
 
@@ -354,7 +355,7 @@ beside, rows = [[(-20.0, 0.0), (20.0, 0.0)]], {}
 for n in (1, 2, 4):
     front = [szlib.Person((0.6 * (i - (n - 1) / 2), 4.0), (0.0, -1.0)) for i in range(n)]
     scene = szlib.Scenario("beside", (0.0, 0.7, 0.0, 0.0), (6.0, 0.7), front, beside, duration=8.0)
-    log = drive(scene, szlib.MPCCBF(zone, walls=beside), until_arrival=False)
+    log = drive(scene, szlib.MPCCBF(zone, walls=beside), LoopSettings(until_arrival=False))
     found = log.metrics()
     rows[n] = [found[each] for each in ("min_clearance_walls", "min_clearance_people", "steps_relaxed")]
 fronts = pd.DataFrame(rows, index=["gap to the wall [m]", "gap to a body [m]", "relaxed steps"]).T
@@ -393,7 +394,7 @@ record.check(
 # %%
 standing = replace(feasibility.CROWD, standing=1.0, min_h=0.0)  # worlds where all people stand
 at_rest = szlib.MPCSettings(terminal="rest")
-driven = szlib.rollouts(4 * worlds, settings=at_rest, worlds=standing, **options)
+driven = szlib.rollouts(4 * worlds, RolloutSetup(worlds=standing), settings=at_rest, **options)
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -483,7 +484,7 @@ record.figure(fig, "guard")
 passage = [[(-6.0, 1.0), (3.0, 1.0)], [(-6.0, -1.0), (3.0, -1.0)], [(3.0, -1.0), (3.0, 1.0)]]
 follower = (szlib.Person((-5.0, 0.0), (1.2, 0.0)),)
 scene = szlib.Scenario("dead end", np.zeros(4), (2.0, 0.0), follower, passage, duration=6.0)
-cornered = drive(scene, szlib.MPCCBF(zone, walls=passage), until_arrival=False)
+cornered = drive(scene, szlib.MPCCBF(zone, walls=passage), LoopSettings(until_arrival=False))
 touched = int(np.argmax(cornered.clearance[:, 0] < 0))  # the first step with an overlap
 f"touched after {cornered.time[touched]:.1f} s, at {cornered.speed[touched]:.3f} m/s"
 

@@ -45,10 +45,11 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 from studies import distances
+from studies.distances import euclidean_to_ellipse
 
 import szlib
-from szlib.control import Obstacle, euclidean_to_ellipse
-from szlib.simulation.closed_loop import drive
+from szlib.control import Obstacle
+from szlib.simulation.closed_loop import LoopSettings, drive
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
@@ -242,7 +243,7 @@ wall = np.array([[(0.0, -1.0), (0.0, 0.0)]])
 start, goal = np.array([-2.0, 3.0, 0.0, 0.0]), np.array([0.0, 0.4])
 scenario = szlib.Scenario("end", start, goal, walls=wall, title="To the end of a wall of 1 m")
 paper = szlib.MPCCBF(zone, walls=wall, settings=szlib.MPCSettings.paper())
-log = drive(scenario, paper, until_arrival=False)
+log = drive(scenario, paper, LoopSettings(until_arrival=False))
 
 careful = szlib.MPCCBF(zone, walls=wall, settings=settings)
 step = careful.step(start, goal)
@@ -252,7 +253,7 @@ print(next(note for note in step.explain().splitlines() if "goal" in note).strip
 # %% jupyter={"source_hidden": true}
 # Figure
 past = szlib.Scenario("past", start, np.array([1.0, -3.0]), walls=wall, title="Around the end of a wall")
-around = drive(past, careful, until_arrival=False)
+around = drive(past, careful, LoopSettings(until_arrival=False))
 fig, panels = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained", sharey=True)
 nearest = around.clearance.min(axis=1).argmin()
 for ax, run, row in zip(panels, (log, around), (-1, nearest), strict=True):

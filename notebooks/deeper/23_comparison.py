@@ -46,10 +46,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
-from studies import comparison
+from studies import comparison, literature_zones
+from studies.literature_zones import ZONES, compare
+from studies.summaries import summarise
 
-from szlib.simulation import comparisons
-from szlib.simulation.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS, ZONES
+from szlib.simulation.monte_carlo import BEHAVIOURS, FORMULATIONS, WORLDS
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, NotebookRecord, parameters
 
@@ -62,8 +63,8 @@ parameters(
         ("people", WORLDS.people, ASSUMED, f"half of them stand; in {WORLDS.size:g} m x {WORLDS.size:g} m"),
         ("walls", WORLDS.walls, ASSUMED, "share of worlds that have some"),
         ("least h at the start [m]", WORLDS.min_h, ASSUMED, "outside every zone that is compared"),
-        ("Hall's radius [m]", comparisons.HALL_PERSONAL, ASSUMED, "far end of the personal distance"),
-        ("Kirby's walking speed [m/s]", comparisons.KIRBY_SPEED, ASSUMED, "that of the people"),
+        ("Hall's radius [m]", literature_zones.HALL_PERSONAL, ASSUMED, "far end of the personal distance"),
+        ("Kirby's walking speed [m/s]", literature_zones.KIRBY_SPEED, ASSUMED, "that of the people"),
     ]
 )
 
@@ -111,12 +112,12 @@ print(f"ellipse: {a:.2f} m and {b:.2f} m; circle: {np.sqrt(a * b):.2f} m")
 of_zone = replace(WORLDS, zone=zone)  # worlds in which all people have this zone
 shared = {"seed": seed, "worlds": of_zone, "n_jobs": n_jobs, "progress": worlds > 10}
 ours = [name for name in FORMULATIONS if name != "paper"]  # its solver is slow
-rows = comparisons.compare(worlds, formulations=ours, **shared)
+rows = compare(worlds, formulations=ours, **shared)
 
 # %% jupyter={"source_hidden": true}
 # Checks
 surprises = [name for name in BEHAVIOURS if name != "as expected"]
-wrong = comparisons.compare(worlds, zones=["fitted"], behaviours=surprises, formulations=ours, **shared)
+wrong = compare(worlds, zones=["fitted"], behaviours=surprises, formulations=ours, **shared)
 violations = int(rows["unflagged_violations"].sum())
 record.check(
     "no step reported as safe led to h < 0 m",
@@ -124,8 +125,8 @@ record.check(
     f"{violations} violations in {len(rows)} runs of 15 s",
     always=True,
 )
-mine = comparisons.summarise(pd.concat([rows, wrong]))
-against_circle = comparisons.summarise(rows, against={"zone": "equal circle"})
+mine = summarise(pd.concat([rows, wrong]))
+against_circle = summarise(rows, against={"zone": "equal circle"})
 record.table(mine.round(4), "23_comparison")
 record.table(against_circle.round(4), "23_paired")
 

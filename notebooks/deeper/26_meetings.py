@@ -47,11 +47,13 @@ from IPython.display import display
 from matplotlib.patches import Circle
 from studies import meetings
 from studies.folds import fold_table
+from studies.summaries import summarise
 
 import szlib
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.scenarios.meetings import Variations, VisiblePeople
+from szlib.simulation.baseline_controllers import CONTROLLERS
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.crowds import VisiblePeople
+from szlib.simulation.scenario import Variations
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 
@@ -101,7 +103,7 @@ logs = {}
 for name, meeting in szlib.MEETINGS.items():
     scenario = Variations(meeting, zone, shift=0.0, pace=(1.0, 1.0))(seed)
     controller = CONTROLLERS["MPC-CBF"](scenario, szlib.MPCSettings())
-    logs[name] = drive(scenario, controller, behaviour=VisiblePeople())
+    logs[name] = drive(scenario, controller, LoopSettings(behaviour=VisiblePeople()))
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -237,7 +239,11 @@ scenario = logs["intersection"].scenario
 bolder = szlib.MPCCBF(zone, walls=scenario.walls, settings=meetings.METHODS["MPC-CBF, bolder"][1])
 way = {
     "gamma = 0.05, N_h = 2": (logs["intersection"], figures.BLUE, "-"),
-    "gamma = 0.2, N = N_h = 24": (drive(scenario, bolder, behaviour=VisiblePeople()), figures.GREEN, "--"),
+    "gamma = 0.2, N = N_h = 24": (
+        drive(scenario, bolder, LoopSettings(behaviour=VisiblePeople())),
+        figures.GREEN,
+        "--",
+    ),
 }
 late, early = (log.time[-1] for log, *_ in way.values())
 

@@ -47,7 +47,7 @@ import numpy as np
 from IPython.display import Markdown
 from studies.atlas import REFERENCE, SCENES, AtlasCell, run_atlas
 
-from szlib.simulation.strategies import STRATEGIES, classify_strategy
+from szlib.simulation.metrics import STRATEGIES, classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
 
@@ -85,7 +85,7 @@ record.figure(fig, "corridor-map")
 #
 # ## What a robot can do
 #
-# Each run gets one name, the first of these that holds (`szlib.simulation.strategies.classify_strategy`):
+# Each run gets one name, the first of these that holds (`szlib.simulation.metrics.classify_strategy`):
 #
 # | name | meaning |
 # |---|---|

@@ -39,6 +39,7 @@ n_replaced = 10  # recorded people whom the robot replaces; 40 at each site for 
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 
 sys.path.append("..")  # for `studies`
@@ -46,16 +47,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown, display
-from studies import crowd_trials, differential_table, walkers
+from studies import crowd_trials, differential_table, replay, walkers
+from studies.safety_claims import MOTION_CHANGES, safety_violations
+from studies.social_metrics import compute_replay_metrics
 
 import szlib
-from szlib.simulation import replay
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.crowds.reacting import ReactingPeople
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.crowds import WALKING_MODELS, ReactingPeople
 from szlib.simulation.metrics import find_avoidance_start
-from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
+from szlib.simulation.monte_carlo import RolloutSetup
 from szlib.simulation.scenario import Scenario
-from szlib.simulation.social_metrics import compute_replay_metrics
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters, read_table
 
@@ -65,8 +66,7 @@ record = NotebookRecord("29_crowds", globals())
 ours, bold = (crowd_trials.SETTINGS[name] for name in ("MPC-CBF", "MPC-CBF, gamma 0.2"))
 crowded, sight = crowd_trials.CROWDED, f"{replay.SENSING_RANGE:g} m"
 alone = f"{replay.MIN_START_DISTANCE:g} m"
-packages = {"orca": "pyrvo", "social force": "pysocialforce"}
-models = [name for name, package in packages.items() if find_spec(package)]
+models = [name for name in WALKING_MODELS if name != "orca" or find_spec("pyrvo")]
 record.key["models of walking"] = ", ".join(models) or "none"
 parameters(
     [
@@ -91,7 +91,7 @@ crossing = Scenario("crossing", start, goal, people, title="Six change places", 
 logs = {}
 for name in models:
     behaviour = ReactingPeople(name, goals=tuple(map(tuple, (-starts).tolist())))
-    logs[name] = drive(crossing, szlib.MPCCBF(zone), behaviour=behaviour, seed=seed)
+    logs[name] = drive(crossing, szlib.MPCCBF(zone), LoopSettings(behaviour=behaviour, seed=seed))
 fig, grid = plt.subplots(1, max(1, len(logs)), figsize=(10, 3.3), layout="constrained", squeeze=False)
 top = max([5.0, *(log.states[:, 1].max() + 1 for log in logs.values())])
 for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
@@ -106,21 +106,21 @@ record.figure(fig, "crossing")
 #
 # ## People who react
 #
-# `ReactingPeople` walk by a model, from its authors' or somebody else's package. Each person has a goal; walls are
+# `ReactingPeople` walk by a model. Each person has a goal; walls are
 # obstacles; the robot is seen as a disc of its size, as a person, or not at all ("nothing").
 #
 # - **orca** (pyrvo): everybody takes half of what keeps two apart for 3 s and expects the other half;
-# - **social force** (PySocialForce): people are pushed by each other, and by walls;
+# - **social force** (with the numbers of PySocialForce): people are pushed by each other, and by walls;
 # - **speed model** (JuPedSim): as fast as the gap ahead allows, around people who are near.
 #
-# The first two come with the extra `crowds`. The third shows how to add a model: it is a class in
+# The first comes with the extra `crowds`. The third shows how to add a model: it is a class in
 # `tests/helpers/speed_model.py`, and `ReactingPeople(SpeedModel)` uses it. Its results below are saved. To
 # compute them again, install JuPedSim and run the study:
 # `pip install --no-deps jupedsim deprecated wrapt`, then `python -m studies.crowd_trials`.
 
 # %% jupyter={"source_hidden": true}
 # Installed models
-missing = [name for name in packages if name not in models]
+missing = [name for name in WALKING_MODELS if name not in models]
 print("here:", ", ".join(models) or "none", "- not installed:", ", ".join(missing) or "none")
 
 # %% [markdown]
@@ -141,9 +141,10 @@ def measure(log: szlib.SimulationLog) -> dict[str, float]:
     return compute_replay_metrics(log) | {"unexplained": float(unexplained.sum())}
 
 
-once = {"seed": seed, "worlds": crowded, "measure": measure, "n_jobs": 1, "progress": worlds > 2}
+once = {"seed": seed, "n_jobs": 1, "progress": worlds > 2}
+crowds = RolloutSetup(worlds=crowded, measure=measure)
 parts = [
-    szlib.rollouts(worlds, behaviour=ReactingPeople(name, sees=sees), **once)
+    szlib.rollouts(worlds, replace(crowds, behaviour=ReactingPeople(name, sees=sees)), **once)
     for name in models
     for sees in ("robot", "nothing")
 ]
@@ -156,7 +157,7 @@ saved = record.committed_table("29_crowds", crowd_trials.recompute, where=f"crow
 
 # %% jupyter={"source_hidden": true}
 # Figure
-reacting = saved[saved["crowd"].isin([*packages, "speed model"])]
+reacting = saved[saved["crowd"].isin([*WALKING_MODELS, "speed model"])]
 shown = ["MPC-CBF", "MPC-CBF, among people", "straight", "social force"]
 labels = {
     "reached": "goal reached, share of trials",
@@ -192,8 +193,8 @@ Markdown(
 # Checks
 floor = record.cache.encounters().attrs.get("area", szlib.ATC_SQUARE)
 made = replay.find_replays(record.cache.tracks(), n_replaced, seed=seed, area=floor, zone=zone)
-runs = [drive(each.scenario, szlib.MPCCBF(zone), behaviour=each) for each in made]
-own = [drive(each.scenario, replay.ReplacedWalker(each), behaviour=each) for each in made]
+runs = [drive(each.scenario, szlib.MPCCBF(zone), LoopSettings(behaviour=each)) for each in made]
+own = [drive(each.scenario, replay.ReplacedWalker(each), LoopSettings(behaviour=each)) for each in made]
 table = pd.DataFrame(
     {
         "robot": pd.DataFrame(map(measure, runs)).mean(),
@@ -210,7 +211,7 @@ table.drop(index="unexplained").round(2)
 # Figure
 busiest = int(np.argmin([compute_replay_metrics(log)["nearest"] for log in runs]))
 fig, ax = plt.subplots(figsize=(7, 4.5), layout="constrained")
-figures.plot_crowd(runs[busiest], replay=made[busiest], ax=ax)
+figures.plot_crowd(runs[busiest], walked=made[busiest].walker.states[:, :2], ax=ax)
 nearest = compute_replay_metrics(runs[busiest])["nearest"]
 ax.set_title(f"The closest of {len(made)} ways: {nearest:.2f} m from centre to centre")
 ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
@@ -247,7 +248,7 @@ record.check(
 # %% jupyter={"source_hidden": true}
 # Figure
 by_crowd = promises[promises["controller"] == "MPC-CBF"].groupby("crowd", sort=False).sum(numeric_only=True)
-ax = figures.plot_safety_claims(by_crowd)
+ax = figures.plot_safety_claims(by_crowd[[*MOTION_CHANGES, "claimed_safe_steps"]])
 ax.set_title("szlib's defaults: people break claims by appearing and turning")
 record.figure(ax.figure, "promises")
 

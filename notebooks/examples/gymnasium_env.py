@@ -21,7 +21,8 @@ import numpy as np
 import szlib
 from szlib.control.controller import DoubleIntegrator
 from szlib.control.people import as_ellipse
-from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED, UNAFFECTED, CrowdModel
+from szlib.simulation.crowds import UNAFFECTED, CrowdModel
+from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
 
 PEOPLE, WALLS, FAR = 5, 4, 50.0  # rows of each, and the largest number of an observation
 

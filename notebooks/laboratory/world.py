@@ -244,18 +244,24 @@ class World:
         begun, zone = self._runs[-1], self.zone
         people = [_person_code(person) for person in self.scenario.people]
         walls = [tuple(map(tuple, wall)) for wall in self.scenario.walls.tolist()]
-        lines = ["import szlib", "from szlib.simulation import drive", "", f"zone = szlib.{zone!r}"]
+        lines = [
+            "import szlib",
+            "from szlib.simulation import LoopSettings, drive",
+            "",
+            f"zone = szlib.{zone!r}",
+        ]
         for name, values in (("people", people), ("walls", map(repr, walls))):
             lines += [f"{name} = [", *(f"    {value}," for value in values), "]"]
-        lines += [f"goal = {self.scenario.goal.tolist()}", ""]
-        until = f"max_time={(self.n - begun.n) * self.dt:.1f}, until_arrival=False"
+        lines += [f"goal = {self.scenario.goal.tolist()}"]
+        time = f"max_time={(self.n - begun.n) * self.dt:.1f}"
+        lines += [f"loop = LoopSettings({time}, until_arrival=False)", ""]
         for end, options, state in zip(("", "_b"), begun.robots, begun.states, strict=False):
             scene = f"{self.scenario.name!r}, {state.tolist()}, goal, people, walls"
             lines += [
                 f"scenario{end} = szlib.Scenario({scene})",
                 f"settings{end} = {options.code}",
                 f"controller{end} = szlib.MPCCBF(zone, walls=walls, settings=settings{end})",
-                f"log{end} = drive(scenario{end}, controller{end}, {until})",
+                f"log{end} = drive(scenario{end}, controller{end}, loop)",
                 f"print(log{end}.controls[-1])  # acceleration of the robot on the screen [m/s2]",
                 "",
             ]

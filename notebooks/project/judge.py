@@ -25,8 +25,9 @@ from studies.atlas import REFERENCE
 from submission import RULES, RefusedError, Submission
 
 import szlib
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.scenarios.meetings import Variations, VisiblePeople
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.crowds import VisiblePeople
+from szlib.simulation.scenario import Variations
 
 PRICE = 5  # a second in somebody's zone costs as much as this many seconds on the way
 RIVALS = sorted((Path(__file__).parent / "rivals").glob("*.py"))
@@ -54,7 +55,7 @@ def judge(file: Path, meeting: str, seeds: list[int], time_limit: float) -> dict
             timer.start()
             try:
                 submission.ask(walls=world.walls.tolist(), zone=(zone.center, zone.semi_axes, zone.angle))
-                log = drive(world, submission, behaviour=VisiblePeople(), settings=RULES)
+                log = drive(world, submission, LoopSettings(behaviour=VisiblePeople(), settings=RULES))
             finally:
                 timer.cancel()
             rows.append(measure(log))

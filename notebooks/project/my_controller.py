@@ -32,10 +32,11 @@ def make_controller(walls, zone):
 if __name__ == "__main__":
     zone = szlib.Ellipse(center=(0.03, 0.0), semi_axes=(0.97, 0.75))
     worlds = szlib.simulation.Variations(szlib.MEETINGS[MEETING], zone)
+    loop = szlib.simulation.LoopSettings(behaviour=szlib.simulation.VisiblePeople())
     for seed in range(3):
         world = worlds(seed)
         controller = make_controller(world.walls, zone)
-        log = szlib.simulation.drive(world, controller, behaviour=szlib.simulation.VisiblePeople())
+        log = szlib.drive(world, controller, loop)
         print(f"world {seed}: {log!r}")
         if seed == 0:
             log.plot().figure.savefig("my_controller.png")

@@ -24,11 +24,11 @@ from szlib.control.mpc import MPCCBF
 from szlib.control.settings import MPCSettings
 from szlib.errors import SolverError
 from szlib.parallel import run_tasks
+from szlib.simulation.catalogue import SCENARIOS
 from szlib.simulation.closed_loop import simulate
 from szlib.simulation.log import SimulationLog
+from szlib.simulation.metrics import classify_strategy
 from szlib.simulation.scenario import Scenario
-from szlib.simulation.scenarios.paper import SCENARIOS
-from szlib.simulation.strategies import classify_strategy
 from szlib.zones.ellipses import Ellipse
 
 SCENES = {"corridor": 4.6, "waiting": 2.0, "making_room": 2.0}

@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies import summaries
 from studies.atlas import REFERENCE
 from studies.committed import write_table
+from studies.literature_zones import compare
 
-from szlib.simulation import comparisons
-from szlib.simulation.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS
+from szlib.simulation.monte_carlo import BEHAVIOURS, FORMULATIONS, WORLDS
 
 RIVAL = {"zone": "equal circle"}
 """The method against which zones are compared world by world."""
@@ -30,7 +31,7 @@ def recompute(row: pd.Series) -> dict[str, float]:
     """The world `PROBE` of a row, again, without a time limit: the same on every machine."""
     settings = replace(FORMULATIONS[row["formulation"]], time_limit=np.inf)
     method = {"zones": [row["zone"]], "behaviours": [row["behaviour"]]}
-    rows = comparisons.compare(
+    rows = compare(
         1, seed=PROBE, **method, formulations={row["formulation"]: settings}, worlds=OF_ZONE, progress=False
     )
     return {"probe": rows[row["metric"]].iloc[0]}
@@ -43,15 +44,15 @@ def recompute_paired(row: pd.Series) -> dict[str, float]:
 
 
 def summarise(rows: pd.DataFrame, **options: Any) -> pd.DataFrame:
-    """Means over worlds, and the world `PROBE`; options as of `comparisons.summarise`."""
-    probe = comparisons.summarise(rows[rows["seed"] == PROBE], **options)["mean"]
-    return comparisons.summarise(rows, **options).drop(columns="first").assign(probe=probe)
+    """Means over worlds, and the world `PROBE`; options as of `summaries.summarise`."""
+    probe = summaries.summarise(rows[rows["seed"] == PROBE], **options)["mean"]
+    return summaries.summarise(rows, **options).drop(columns="first").assign(probe=probe)
 
 
 if __name__ == "__main__":
     worlds = int(sys.argv[1])
-    rows = comparisons.compare(worlds, worlds=OF_ZONE)
+    rows = compare(worlds, worlds=OF_ZONE)
     surprises = [name for name in BEHAVIOURS if name != "as expected"]
-    wrong = comparisons.compare(worlds, zones=["fitted"], behaviours=surprises, worlds=OF_ZONE)
+    wrong = compare(worlds, zones=["fitted"], behaviours=surprises, worlds=OF_ZONE)
     write_table(summarise(pd.concat([rows, wrong])), "23_comparison")
     write_table(summarise(rows, against=RIVAL), "23_paired")

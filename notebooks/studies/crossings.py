@@ -26,7 +26,7 @@ from studies.committed import write_table
 import szlib
 from szlib.checks import Array
 from szlib.control.controller import Controller, advance
-from szlib.simulation.comparisons import CONTROLLERS
+from szlib.simulation.baseline_controllers import CONTROLLERS
 from szlib.simulation.scenario import Scenario
 
 # Radius of the robot and of people [m]; time step and time limit [s]: CrowdNav ends 1 s before its 25 s.

@@ -26,18 +26,18 @@ import numpy as np
 import pandas as pd
 from studies.claims import SITES
 from studies.committed import write_table
+from studies.replay import ReplacedWalker, Replays, find_replays
+from studies.safety_claims import MOTION_CHANGES, safety_violations
+from studies.social_metrics import compute_replay_metrics
+from studies.summaries import summarise
 
 import szlib
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
-from szlib.simulation.crowds.walking_model import ModelFactory
+from szlib.simulation.baseline_controllers import CONTROLLERS, ControllerFactory, make_mpc_cbf
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.crowds import WALKING_MODELS, ModelFactory, ReactingPeople
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.monte_carlo import ControllerFactory, make_mpc_cbf
-from szlib.simulation.replay import ReplacedWalker, Replays, find_replays
-from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
-from szlib.simulation.scenarios.random_worlds import Worlds
-from szlib.simulation.social_metrics import compute_replay_metrics
+from szlib.simulation.monte_carlo import RolloutSetup
+from szlib.simulation.scenario import Worlds
 
 CROWDED = Worlds(
     people=(6, 10),
@@ -118,11 +118,11 @@ def controllers(
 def factories() -> dict[str, ModelFactory]:
     """The models of walking: szlib's, and JuPedSim's, which the tests define, where it is installed."""
     if not find_spec("jupedsim"):
-        return dict(MODELS)
+        return dict(WALKING_MODELS)
     sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
     from helpers.speed_model import SpeedModel
 
-    return {**MODELS, "speed model": SpeedModel}
+    return {**WALKING_MODELS, "speed model": SpeedModel}
 
 
 def react(
@@ -136,11 +136,10 @@ def react(
     """Trials of one controller among people who walk by a model; `more`: as of `szlib.rollouts`."""
     return szlib.rollouts(
         n,
+        RolloutSetup(
+            worlds=CROWDED, behaviour=ReactingPeople(model, sees=sees), controller=factory, measure=measure
+        ),
         settings=settings,
-        worlds=CROWDED,
-        behaviour=ReactingPeople(model, sees=sees),
-        controller=factory,
-        measure=measure,
         progress=False,
         **more,
     )
@@ -183,11 +182,13 @@ def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
         for name, factory, settings, trials in controllers(n, len(made), IN_PLACE, IN_PLACE):
             rows = szlib.rollouts(
                 trials,
+                RolloutSetup(
+                    worlds=made,
+                    behaviour=made,
+                    controller=make_mpc_cbf if name.startswith("MPC") else factory,
+                    measure=measure,
+                ),
                 settings=settings,
-                worlds=made,
-                behaviour=made,
-                controller=make_mpc_cbf if name.startswith("MPC") else factory,
-                measure=measure,
                 out=work,
                 n_jobs=1,
                 progress=False,
@@ -198,7 +199,10 @@ def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
 
 def walkers(made: Replays) -> pd.DataFrame:
     """Scores of the people who are replaced."""
-    logs = (drive(each.scenario, ReplacedWalker(each), behaviour=each, until_arrival=False) for each in made)
+    logs = (
+        drive(each.scenario, ReplacedWalker(each), LoopSettings(behaviour=each, until_arrival=False))
+        for each in made
+    )
     return pd.DataFrame([{"seed": i} | compute_replay_metrics(log) for i, log in enumerate(logs)])
 
 

@@ -9,13 +9,13 @@ there. Finished worlds are kept in results/rollouts, so that a run that was stop
 """
 
 import argparse
-from functools import partial
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from studies.committed import write_table
-from studies.distances import euclidean_to_segment
+from studies.distances import euclidean_to_ellipse, euclidean_to_segment
 from studies.rollout_table import interval
 
 import szlib
@@ -23,10 +23,9 @@ from szlib.checks import Array
 from szlib.control.differential_drive import Unicycle
 from szlib.control.obstacles import ellipse_distance
 from szlib.control.settings import TOLERANCE
-from szlib.control.verification import euclidean_to_ellipse
-from szlib.simulation.monte_carlo import DEFAULT_ZONE, make_mpc_cbf
-from szlib.simulation.scenario import GOAL_RADIUS
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
+from szlib.simulation.baseline_controllers import DEFAULT_ZONE, make_mpc_cbf
+from szlib.simulation.monte_carlo import RolloutSetup
+from szlib.simulation.scenario import GOAL_RADIUS, ONE_PERSON, Worlds
 from szlib.zones.ellipses import BODY_RADIUS
 
 TABLE = "29_differential"
@@ -160,8 +159,8 @@ GAPS = ("zone", "body", "wall")
 def probe(name: str, robot: str) -> dict[str, float]:
     """Path and smallest gap to a zone in the first worlds [m], without a time limit."""
     settings = szlib.MPCSettings(time_limit=np.inf)
-    drive = partial(szlib.rollouts, 3, seed=FIRST, measure=finely, progress=False)
-    first = drive(worlds=SETS[name], controller=ROBOTS[robot], settings=settings)
+    setup = RolloutSetup(worlds=SETS[name], controller=ROBOTS[robot], measure=finely)
+    first = szlib.rollouts(3, setup, settings=settings, seed=FIRST, progress=False)
     return {"probe path": float(first["path_length"].sum()), "probe zone": float(first["fine_zone"].min())}
 
 
@@ -177,13 +176,15 @@ def main() -> None:
     parser.add_argument("--robots", nargs="+", default=TABULATED, choices=ROBOTS, help="which robots")
     parser.add_argument("--sets", nargs="+", default=list(SETS), choices=SETS, help="which worlds")
     given = parser.parse_args()
-    drive = partial(
-        szlib.rollouts, given.worlds, seed=FIRST, measure=finely, out=given.out, n_jobs=given.jobs
-    )
+    options = {"seed": FIRST, "out": given.out, "n_jobs": given.jobs}
     lines = []
     for name in given.sets:
-        tables = {robot: drive(worlds=SETS[name], controller=ROBOTS[robot]) for robot in given.robots}
-        against = drive(worlds=SETS[name], controller=make_mpc_cbf)
+        setup = RolloutSetup(worlds=SETS[name], measure=finely)
+        tables = {
+            robot: szlib.rollouts(given.worlds, replace(setup, controller=ROBOTS[robot]), **options)
+            for robot in given.robots
+        }
+        against = szlib.rollouts(given.worlds, setup, **options)
         for robot, rows in tables.items():
             lines.append({"set": name, "robot": robot, **line(rows, against), **probe(name, robot)})
         write_table(pd.DataFrame(lines), TABLE, seed=FIRST)

@@ -29,10 +29,57 @@ from numpy.typing import ArrayLike
 
 import szlib
 from szlib.checks import Array, check_array
-from szlib.control import Wall, ellipse_distance, euclidean_to_ellipse, segment_distance
+from szlib.control import Wall, ellipse_distance, segment_distance
 from szlib.control.obstacles import check_wall
 from szlib.workbook import figures
 from szlib.zones.ellipses import Ellipse
+
+_BISECTIONS = 60  # halvings of a quarter turn that reach double precision
+
+
+def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
+    """Euclidean signed distance of points to an ellipse, negative inside, shape (...) [m].
+
+    Parameters
+    ----------
+    points : positions, shape (..., 2) [m].
+    ellipse : the zone.
+
+    Notes
+    -----
+    For (p, q) in the first quadrant of the ellipse's frame the nearest point is (a cos t, b sin t), with t
+    the root of half the derivative of the squared distance,
+
+        a p sin t - b q cos t - (a^2 - b^2) sin t cos t.
+
+    It is negative below this one root in the quadrant and positive above, so bisection finds it.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from studies.distances import euclidean_to_ellipse
+    >>> ellipse = szlib.Ellipse((0.0, 0.0), (2.0, 1.0))
+    >>> euclidean_to_ellipse([(3.0, 0.0), (0.0, 2.0)], ellipse).round(6).tolist()
+    [1.0, 1.0]
+    """
+    offset = check_array("points", points, (..., 2)) - ellipse.center
+    (a, b), cos, sin = ellipse.semi_axes, np.cos(ellipse.angle), np.sin(ellipse.angle)
+    p = np.abs(offset[..., 0] * cos + offset[..., 1] * sin)
+    q = np.abs(offset[..., 1] * cos - offset[..., 0] * sin)
+    low, high = np.zeros_like(p), np.full_like(p, np.pi / 2)
+    for _ in range(_BISECTIONS):
+        t = (low + high) / 2
+        below = (
+            a * p * np.sin(t)
+            - b * q * np.cos(t)
+            - (a**2 - b**2) * np.sin(t) * np.cos(t)
+            < 0
+        )
+        low, high = np.where(below, t, low), np.where(below, high, t)
+    inside = (p / a) ** 2 + (q / b) ** 2 < 1
+    return np.asarray(
+        np.hypot(p - a * np.cos(low), q - b * np.sin(low)) * np.where(inside, -1, 1)
+    )
 
 
 def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:

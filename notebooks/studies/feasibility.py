@@ -14,7 +14,8 @@ import pandas as pd
 from studies.committed import write_table
 
 import szlib
-from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.simulation.monte_carlo import RolloutSetup
+from szlib.simulation.scenario import Worlds
 
 CROWD = Worlds(people=(2, 4), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=0.3)
 CELLS = tuple(product((0.05, 0.1, 0.2, 0.4, 0.8), (1, 2, 4, 8), (0.5, 1.0, 2.0)))
@@ -28,7 +29,7 @@ def drive_cells(cells: Iterable[tuple[float, int, float]], worlds: int, **more: 
     table = []
     for gamma, N_h, a_max in cells:
         settings = szlib.MPCSettings(gamma=gamma, N_h=N_h, a_max=a_max, time_limit=np.inf)
-        rows = szlib.rollouts(worlds, settings=settings, worlds=CROWD, **more)
+        rows = szlib.rollouts(worlds, RolloutSetup(worlds=CROWD), settings=settings, **more)
         row = {"gamma": gamma, "N_h": N_h, "a_max": a_max, "worlds": worlds}
         row |= {"infeasible_steps": rows["infeasible_steps"].mean(), "min_h": rows["min_h"].min()}
         row |= {"unflagged_violations": rows["unflagged_violations"].sum()}

@@ -17,12 +17,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 from studies.atlas import REFERENCE
 from studies.committed import write_table
+from studies.social_metrics import compute_social_metrics
+from studies.summaries import summarise
 
 import szlib
-from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.monte_carlo import rollouts
-from szlib.simulation.scenarios.meetings import Variations, VisiblePeople
-from szlib.simulation.social_metrics import compute_social_metrics
+from szlib.simulation.baseline_controllers import CONTROLLERS
+from szlib.simulation.crowds import VisiblePeople
+from szlib.simulation.monte_carlo import RolloutSetup, rollouts
+from szlib.simulation.scenario import Variations
 from szlib.workbook import figures
 
 METRICS = ["success", "time_to_goal", "path_efficiency", "heading_changes", "time_not_moving"]
@@ -53,11 +55,13 @@ def meet(
     for name in meetings:
         rows = rollouts(
             variations,
+            RolloutSetup(
+                worlds=Variations(szlib.MEETINGS[name], zone),
+                behaviour=VisiblePeople(),
+                controller=CONTROLLERS[controller],
+                measure=compute_social_metrics,
+            ),
             settings=settings if time_limit is None else replace(settings, time_limit=time_limit),
-            worlds=Variations(szlib.MEETINGS[name], zone),
-            behaviour=VisiblePeople(),
-            controller=CONTROLLERS[controller],
-            measure=compute_social_metrics,
             **more,
         )
         tables.append(rows.assign(meeting=name, controller=method))

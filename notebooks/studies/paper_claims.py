@@ -25,11 +25,11 @@ from szlib.control.mpc import MPCCBF
 from szlib.encounters.kinds import OPPOSITE
 from szlib.encounters.null_model import NullEncounters
 from szlib.errors import DataError, ZoneError
+from szlib.simulation.catalogue import SCENARIOS
 from szlib.simulation.closed_loop import simulate
 from szlib.simulation.metrics import compute_metrics
-from szlib.simulation.run import Run
+from szlib.simulation.robot_run import Run
 from szlib.simulation.scenario import Claim
-from szlib.simulation.scenarios.paper import SCENARIOS
 from szlib.workbook.record import NotebookRecord
 from szlib.zones.ellipses import Ellipse
 from szlib.zones.outliers import R_MAX

@@ -19,9 +19,9 @@ from studies.committed import write_table
 
 import szlib
 from szlib.control.settings import TOLERANCE
-from szlib.simulation.monte_carlo import rollouts
-from szlib.simulation.outcomes import Outcome
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
+from szlib.simulation.metrics import Outcome
+from szlib.simulation.monte_carlo import RolloutSetup, rollouts
+from szlib.simulation.scenario import ONE_PERSON, Worlds
 
 TABLE = "21_rollouts"
 APART = 1_000_000
@@ -96,7 +96,9 @@ def row(blocks: list[pd.DataFrame]) -> dict[str, Any]:
 def probe(worlds: Worlds, formulation: str) -> float:
     """Path and least h in the world `PROBE`, summed [m], without a time limit: the same on every machine."""
     settings = replace(FORMULATIONS[formulation], time_limit=np.inf)
-    one = rollouts(1, seed=APART + PROBE, settings=settings, worlds=worlds, progress=False).iloc[0]
+    one = rollouts(
+        1, RolloutSetup(worlds=worlds), seed=APART + PROBE, settings=settings, progress=False
+    ).iloc[0]
     return float(one["path_length"] + one["min_h"])
 
 
@@ -118,9 +120,9 @@ def main() -> None:
             for formulation in formulations:
                 table = rollouts(
                     given.paper_worlds if formulation == "paper" else given.worlds,
+                    RolloutSetup(worlds=worlds),
                     seed=(block + 1) * APART,
                     settings=FORMULATIONS[formulation],
-                    worlds=worlds,
                     out=given.out,
                     n_jobs=given.jobs,
                 )

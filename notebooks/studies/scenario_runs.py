@@ -15,7 +15,7 @@ from studies import paper_claims
 
 import szlib
 from szlib.simulation.metrics import ACTIVE_RESIDUAL
-from szlib.simulation.run import Run
+from szlib.simulation.robot_run import Run
 from szlib.simulation.scenario import Scenario
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters

@@ -23,13 +23,13 @@ import pandas as pd
 from studies.claims import SITES
 from studies.committed import write_table
 from studies.crowd_trials import zone_of
+from studies.replay import TIME_FACTOR, ReplacedWalker, Replay, find_replays
+from studies.social_metrics import REACHED, compute_replay_metrics
+from studies.summaries import summarise
 
 import szlib
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.monte_carlo import make_mpc_cbf
-from szlib.simulation.replay import TIME_FACTOR, ReplacedWalker, Replay, find_replays
-from szlib.simulation.social_metrics import REACHED, compute_replay_metrics
+from szlib.simulation.baseline_controllers import CONTROLLERS, make_mpc_cbf
+from szlib.simulation.closed_loop import LoopSettings, drive
 from szlib.tracks.clock import TICKS_PER_SECOND
 
 PLACES = ("plaza", "Grand Central", "Grand Central, long", "ETH", "ATC day", "THOR-MAGNI")
@@ -87,7 +87,7 @@ def own_speed(way: Replay) -> float:
 
 def measure(way: Replay, controller: szlib.control.Controller) -> dict[str, float]:
     """Scores of one trial; jerk until the goal is reached."""
-    log = drive(way.scenario, controller, behaviour=way, until_arrival=False)
+    log = drive(way.scenario, controller, LoopSettings(behaviour=way, until_arrival=False))
     scores = compute_replay_metrics(log)
     near = np.flatnonzero(np.hypot(*(log.states[:, :2] - way.scenario.goal).T) <= REACHED)
     gone = log.states[: near[0] + 1 if len(near) else None, 2:]

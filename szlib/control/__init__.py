@@ -34,6 +34,6 @@ from .obstacles import (
 from .people import Person, Prediction, TrackedPeople, Tracker, predict
 from .settings import MPCSettings
 from .step import STATUSES, Scene, Step
-from .verification import Report, euclidean_to_ellipse
+from .verification import Report
 from .walls import read_walls, walls_from_grid, walls_from_map
 from .ways import Way

@@ -81,7 +81,8 @@ def precision_and_recall(
     >>> precision_and_recall(np.array([True, True, False]), np.array([True, False, False]))
     (0.5, 1.0)
     """
-    removed, intruders = np.asarray(removed, bool), np.asarray(intruders, bool)
+    removed = np.asarray(removed, bool)
+    intruders = np.asarray(intruders, bool)
     if removed.shape != intruders.shape:
         raise DataError(
             f"expected two arrays of one shape; got {removed.shape} and {intruders.shape}"
@@ -123,10 +124,8 @@ def largest_error(
     """
     errors = []
     for speed in speeds:
-        fitted, true = (
-            zone.ellipse(speed),
-            (settings or PlazaSettings()).true_zone(speed),
-        )
+        fitted = zone.ellipse(speed)
+        true = (settings or PlazaSettings()).true_zone(speed)
         errors += [
             *np.subtract(fitted.center, true.center),
             *np.subtract(fitted.semi_axes, true.semi_axes),

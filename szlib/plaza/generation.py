@@ -36,7 +36,8 @@ from .settings import (
 KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder")
 """Kinds of encounter; the first three by the angle between the directions of motion when closest."""
 # First id, and step between ids, as on the first day of ATC. The ids of a pair are successive.
-FIRST_ID, ID_STEP = 9_190_600, 100
+FIRST_ID = 9_190_600
+ID_STEP = 100
 
 # of staged encounters, each with x and y
 _VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")
@@ -48,14 +49,17 @@ _MAX_CURVATURE = 1.2  # of a path in the walker's frame [1/m]
 _CHECKS = 15  # of a path in a second
 _MAX_ROUNDS = 5000  # of draws
 # each draw is 1 mm farther out; a new bearing after so many draws
-_SHIFT, _NEW_BEARING = (0.001, 200)
+_SHIFT = 0.001
+_NEW_BEARING = 200
 # After so many draws the mean clearance grows as well: companions with small zones walk too near otherwise.
 _GROWS_AFTER = 1000
 _FRAMES = (33, 50)  # time between frames, (shortest, longest) [ms]
-_SHORT_GAP, _LONG_GAP = (0.1, 0.4), (0.6, 1.0)  # a gap of 0.5 s ends a track [s]
+_SHORT_GAP = (0.1, 0.4)  # a gap of 0.5 s ends a track [s]
+_LONG_GAP = (0.6, 1.0)
 _HEIGHT = (1.5, 1.8)  # of people [m]
 # of the sensor's own velocity [m/s] and facing angle [rad]
-_VELOCITY_NOISE, _FACING_NOISE = (0.45, 0.3)
+_VELOCITY_NOISE = 0.45
+_FACING_NOISE = 0.3
 
 
 def make_plaza(
@@ -85,7 +89,8 @@ def make_plaza(
     >>> szlib.read_tracks(path)["id"].nunique() >= 40
     True
     """
-    path, settings = Path(path), settings or PlazaSettings()
+    path = Path(path)
+    settings = settings or PlazaSettings()
     rows = _record(stage_encounters(seed=seed, settings=settings), seed, settings)
     write_file(path, rows.write_csv(include_header=False, float_precision=3))
     return path
@@ -118,11 +123,13 @@ def stage_encounters(
     >>> len(stage_encounters(seed=1, settings=szlib.PlazaSettings(n_encounters=20)))
     20
     """
-    rng, settings = np.random.default_rng(seed), settings or PlazaSettings()
+    rng = np.random.default_rng(seed)
+    settings = settings or PlazaSettings()
     plan, speed, before, motion = _draw_encounters(rng, settings)
     n = len(plan)
     heading = rng.uniform(-np.pi, np.pi, n)
-    ahead, swept = _unit_vectors(heading), swept_length(speed)
+    ahead = _unit_vectors(heading)
+    swept = swept_length(speed)
     half = (
         np.abs(ahead) * swept[:, None] + np.abs(_rotate_left(ahead)) * SPACE.width
     ) / 2
@@ -193,12 +200,11 @@ def _draw_encounters(
     plan = np.array(["standing", "together", "intruder", "passing"])[
         np.searchsorted(ends, rng.permutation(n), side="right")
     ]
-    speed, bearing = (
-        _stratify(rng, n, *settings.speeds),
-        _stratify(rng, n, -np.pi, np.pi),
-    )
+    speed = _stratify(rng, n, *settings.speeds)
+    bearing = _stratify(rng, n, -np.pi, np.pi)
     clear = rng.exponential(settings.clearance, n)
-    before, motion = np.zeros(n), np.zeros((n, 3, 2))
+    before = np.zeros(n)
+    motion = np.zeros((n, 3, 2))
     pending = np.arange(n)
     for number in range(_MAX_ROUNDS):
         is_last = number % _NEW_BEARING == _NEW_BEARING - 1
@@ -235,7 +241,9 @@ def _draw(
 
     `bearing` is the parameter of the nearest point on the ellipse; intruders pass the person at this bearing.
     """
-    n, standing, intruder = len(plan), plan == "standing", plan == "intruder"
+    n = len(plan)
+    standing = plan == "standing"
+    intruder = plan == "intruder"
     center, semi_axes, angle = settings.interpolate_zones(speed)
     a, b = semi_axes.T
     beside = np.arctan2(b * np.cos(angle), a * np.sin(angle)) + np.pi * rng.integers(
@@ -251,7 +259,8 @@ def _draw(
     offset = np.where(
         intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal
     )
-    (low, high), limit = settings.intruder_speeds, 2 * settings.max_speed
+    (low, high) = settings.intruder_speeds
+    limit = 2 * settings.max_speed
     pace = rng.uniform(
         np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit)
     )
@@ -288,7 +297,8 @@ def _is_possible(
         & (np.abs(y) <= SPACE.width / 2 - MARGIN)
     )
     pace = np.linalg.norm(velocity, axis=-1)
-    is_standing, is_respectful = plan == "standing", plan != "intruder"
+    is_standing = plan == "standing"
+    is_respectful = plan != "intruder"
     is_fast_enough = (pace >= MIN_WALKING_SPEED) | is_standing[:, None]
     has_walking_speed = ((pace <= settings.max_speed) & is_fast_enough).all(axis=1)
     possible = is_in_view & (np.hypot(x, y) >= 1 + MARGIN) & has_walking_speed
@@ -326,7 +336,8 @@ def _stays_outside(
 def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.DataFrame:
     """The recording of the sensor: the columns of an ATC file, two rows for each frame, without the gaps."""
     rng = np.random.default_rng([seed, 1])
-    n, start = len(staged), staged["start"].to_numpy()
+    n = len(staged)
+    start = staged["start"].to_numpy()
     lasts = start[-1] - start[0] + settings.tracked
     ms = rng.integers(*_FRAMES, int(lasts * 1000 / _FRAMES[0]) + 1, endpoint=True)
     frames = start[0] + np.cumsum(ms) / 1000
@@ -343,7 +354,8 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     height = rng.uniform(*_HEIGHT, (n, 2))[pair] + rng.normal(
         0, settings.noise, velocity.shape[:2]
     )
-    short, long = settings.short_gaps, settings.long_gaps
+    short = settings.short_gaps
+    long = settings.long_gaps
     kind = rng.choice(3, (n, 2), p=[short, long, 1 - short - long])
     length = np.stack(
         [
@@ -395,5 +407,6 @@ def _rotate_left(vectors: Array) -> Array:
 
 def _rotate(vectors: Array, angle: Array) -> Array:
     """Rotate `vectors` (..., 2) by `angle` (...) [rad], counter-clockwise."""
-    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    cos = np.cos(angle)[..., None]
+    sin = np.sin(angle)[..., None]
     return np.asarray(cos * vectors + sin * _rotate_left(vectors))

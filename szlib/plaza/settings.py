@@ -18,16 +18,16 @@ from ..zones.polar import ellipse_reach
 MIN_WALKING_SPEED = 0.45
 SPACE = AttentionalSpace()
 MARGIN = 0.15  # distance from an edge at which a point stays inside in spite of the noise [m]
-RUSHING_INTRUDERS, SLOW_INTRUDERS = (1.5, np.inf), (0.25, 1.0)
+RUSHING_INTRUDERS = (1.5, np.inf)
+SLOW_INTRUDERS = (0.25, 1.0)
 ANY_SPEED_INTRUDERS = (0.25, np.inf)
 """Speeds of intruders relative to the walker, (lowest, highest) [m/s]."""
 WINDOW = 3.4  # a pair seen for this time is seen for 3 s of the clock, wherever its ticks fall [s]
 
-_LOW_SPEED, _HIGH_SPEED = 0.5, 1.5  # speeds of `slow_zone` and `fast_zone` [m/s]
-_SLOW_ZONE, _FAST_ZONE = (
-    Ellipse((0.04, 0.0), (0.88, 0.68)),
-    Ellipse((0.06, 0.0), (1.0, 0.78)),
-)
+_LOW_SPEED = 0.5  # speeds of `slow_zone` and `fast_zone` [m/s]
+_HIGH_SPEED = 1.5
+_SLOW_ZONE = Ellipse((0.04, 0.0), (0.88, 0.68))
+_FAST_ZONE = Ellipse((0.06, 0.0), (1.0, 0.78))
 _JAPAN = timezone(timedelta(hours=9))
 _FIRST_HOUR = 10  # of the day, when the first pair comes
 # the window of 3 s begins at the first tick or, at the latest, the next [s]
@@ -112,15 +112,11 @@ class PlazaSettings:
     date: str = "2000-01-02"
 
     def __post_init__(self) -> None:
-        (low, high), nearest, speed = (
-            self.speeds,
-            self.intruder_distances,
-            self.intruder_speeds,
-        )
-        shares, gaps = (
-            (self.standing, self.together, self.intruders),
-            (self.short_gaps, self.long_gaps),
-        )
+        (low, high) = self.speeds
+        nearest = self.intruder_distances
+        speed = self.intruder_speeds
+        shares = (self.standing, self.together, self.intruders)
+        gaps = (self.short_gaps, self.long_gaps)
         for names, values in (
             ("standing, together, intruders", shares),
             ("short_gaps, long_gaps", gaps),
@@ -181,7 +177,8 @@ class PlazaSettings:
 
     def interpolate_zones(self, speed: Array) -> tuple[Array, Array, Array]:
         """Centres (..., 2), semi-axes (..., 2) [m] and angles (...) [rad] of the zones at `speed`."""
-        slow, fast = self.slow_zone, self.fast_zone
+        slow = self.slow_zone
+        fast = self.fast_zone
         share = (speed - _LOW_SPEED) / (_HIGH_SPEED - _LOW_SPEED)
         turn = Ellipse(
             (0, 0), (1, 1), fast.angle - slow.angle

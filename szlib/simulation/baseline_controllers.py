@@ -16,19 +16,31 @@ avoidance", IEEE Robotics & Automation Magazine 4(1), 1997.  World frame, metres
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ..checks import Array
-from ..control.controller import Controller
-from ..control.obstacles import Body, Obstacles
-from ..control.people import Person
-from ..control.settings import MPCSettings
-from ..zones.ellipses import BODY_RADIUS
+from ..control import MPCCBF, Body, Controller, MPCSettings, Obstacles, Person
+from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
+
+# Makes a controller for a scenario. A function of a module, so that other processes find it.
+ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
+# Zone of people who have none [m] (assumed); in random worlds all people have one.
+DEFAULT_ZONE = Ellipse((0.0, 0.0), (1.0, 1.0))
+
+
+def make_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
+    """The MPC-CBF controller for a `scenario` with `settings`; people without a zone have `DEFAULT_ZONE`."""
+    return MPCCBF(
+        DEFAULT_ZONE,
+        walls=scenario.walls,
+        obstacles=scenario.obstacles,
+        settings=settings,
+    )
 
 
 class BaselineController(Controller):
@@ -43,7 +55,8 @@ class BaselineController(Controller):
     settings: MPCSettings
 
     def __init__(self, scenario: Scenario, settings: MPCSettings) -> None:
-        self.settings, self.walls = settings, scenario.walls
+        self.settings = settings
+        self.walls = scenario.walls
         self._fixed = Obstacles.of(scenario.fixed, settings)
 
     def step(
@@ -52,7 +65,8 @@ class BaselineController(Controller):
         """The acceleration towards the desired velocity; see `Controller.step` for `state`, `goal`,
         `people`.
         """
-        s, desired = self.settings, self.desired_velocity(state, goal, people)
+        s = self.settings
+        desired = self.desired_velocity(state, goal, people)
         change = (desired / max(1.0, np.hypot(*desired) / s.v_max) - state[2:]) / s.dt
         return SimpleNamespace(
             control=change / max(1.0, np.abs(change).max() / s.a_max)
@@ -105,7 +119,9 @@ class StraightController(BaselineController):
         self, state: Array, goal: Array, people: Sequence[Person]
     ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
-        s, position, velocity = self.settings, state[:2], state[2:]
+        s = self.settings
+        position = state[:2]
+        velocity = state[2:]
         ahead = self.velocity_to_goal(goal - position)
         reach = (
             float(velocity @ velocity) / (2 * s.a_max) + s.v_max * s.dt + self.margin
@@ -138,14 +154,15 @@ class SocialForceController(BaselineController):
         self, state: Array, goal: Array, people: Sequence[Person]
     ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
-        position, velocity = state[:2], state[2:]
+        position = state[:2]
+        velocity = state[2:]
         force = (self.velocity_to_goal(goal - position) - velocity) / self.tau
         for person in people:
             force = force + self._push(position, velocity, person)
-        for xa, ya, xb, yb in self.walls.reshape(-1, 4).tolist():
-            along = np.array([xb - xa, yb - ya])
-            share = np.clip((position - (xa, ya)) @ along / (along @ along), 0, 1)
-            away = position - (xa, ya) - share * along
+        for begin, end in self.walls:
+            along = end - begin
+            share = np.clip((position - begin) @ along / (along @ along), 0, 1)
+            away = position - begin - share * along
             distance = max(float(np.hypot(*away)), 1e-9)
             gap = distance - self.settings.r_robot
             force = (
@@ -160,10 +177,12 @@ class SocialForceController(BaselineController):
         apart = distance - self.settings.r_robot + BODY_RADIUS
         drive = to / distance + self.relative * (velocity - person.velocity)
         size = max(float(np.hypot(*drive)), 1e-9)
-        drive, b = drive / size, self.reach * size
+        drive = drive / size
+        b = self.reach * size
         left = np.array([-drive[1], drive[0]])
         theta = np.arctan2(left @ to, drive @ to) + 0.005 * b
-        slow, turn = np.exp(-((2 * b * theta) ** 2)), np.exp(-((3 * b * theta) ** 2))
+        slow = np.exp(-((2 * b * theta) ** 2))
+        turn = np.exp(-((3 * b * theta) ** 2))
         return np.asarray(
             -self.strength
             * np.exp(-apart / b)
@@ -190,7 +209,9 @@ class DynamicWindowController(BaselineController):
         self, state: Array, goal: Array, people: Sequence[Person]
     ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
-        s, position, velocity = self.settings, state[:2], state[2:]
+        s = self.settings
+        position = state[:2]
+        velocity = state[2:]
         change = np.linspace(-1, 1, self.samples) * s.a_max * s.dt
         window = velocity + np.stack(np.meshgrid(change, change), axis=-1).reshape(
             -1, 2
@@ -206,3 +227,12 @@ class DynamicWindowController(BaselineController):
         to_goal = np.hypot(*(at[:, -1] - goal).T)
         value = self.clearance * np.minimum(gap.min(axis=1), 1.0) - to_goal
         return np.asarray(window[np.where(admissible, value, -np.inf).argmax()])
+
+
+CONTROLLERS: dict[str, ControllerFactory] = {
+    "MPC-CBF": make_mpc_cbf,
+    "straight": StraightController,
+    "social force": SocialForceController,
+    "dynamic window": DynamicWindowController,
+}
+"""MPC-CBF and its rivals, by name; another rival is one more entry."""

@@ -8,37 +8,27 @@ moves them.  World frame, metres and seconds.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from math import hypot, isfinite
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..checks import Array
-from ..control.controller import Controller, as_controller
-from ..control.obstacles import Obstacle
-from ..control.people import Person, SpeedZone, as_ellipse
-from ..control.settings import MPCSettings
+from ..control import Controller, MPCSettings, Obstacle, Person, as_controller
+from ..control.people import SpeedZone, as_ellipse
 from ..errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
+from .crowds import UNAFFECTED, Crowd, CrowdModel
 from .log import SimulationLog
-from .scenario import (
-    GOAL_RADIUS,
-    STOPPED_SPEED,
-    UNAFFECTED,
-    Crowd,
-    CrowdModel,
-    Scenario,
-)
+from .scenario import GOAL_RADIUS, STOPPED_SPEED, Scenario
 
 # Makes the zone that the robot keeps out of from a person's own zone.
 ZoneTransform = Callable[[Ellipse], Ellipse]
 
 # Zone of people if neither they nor the controller have one: their body.
 BODY_ZONE = Ellipse((0.0, 0.0), (BODY_RADIUS, BODY_RADIUS))
-_ABSENT = (np.nan,) * 5
+_ABSENT = [np.nan] * 5
 # What the log keeps of each step, as of `szlib.Step`, and its value if a controller does not report it.
 # The step itself is not kept: a thousand of them cost a garbage collection.
 _UNREPORTED = {
@@ -48,7 +38,34 @@ _UNREPORTED = {
     "safe": None,
     "slack": np.nan,
     "stuck": 0.0,
+    "solve_time": None,
 }
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """How the loop runs: who moves the people, who measures, and when it ends.
+
+    Parameters
+    ----------
+    behaviour : how people move and how the controller sees them.
+    crowd : the true people, in place of those of `behaviour`. If the scenario has people, the crowd must have
+        as many, and their zones apply; else each person has the zone with which they first appear.
+    seed : seed of the behaviour.
+    zone_transform : makes the zone that the robot keeps out of from each person's own zone, or the
+        controller's, or `BODY_ZONE`; from the smallest circle around it for a person without a heading.
+    settings : settings of the measurements (dt, r_robot, eps, zone_speed); None: the controller's.
+    max_time : time limit [s]; None: the scenario's duration.
+    until_arrival : False: run to the time limit, so that a robot at its goal may still have to make room.
+    """
+
+    behaviour: CrowdModel = UNAFFECTED
+    crowd: Crowd | None = None
+    seed: int = 0
+    zone_transform: ZoneTransform | None = None
+    settings: MPCSettings | None = None
+    max_time: float | None = None
+    until_arrival: bool = True
 
 
 def simulate(
@@ -94,7 +111,7 @@ def simulate(
             f"the controller knows {len(controller.walls)} walls, and not the {len(scenario.walls)} of "
             f"{scenario.name!r}; build it with walls=scenario.walls"
         )
-    known = getattr(controller, "obstacles", None)
+    known = controller.obstacles
     if known is not None and _list_numbers(known) != _list_numbers(scenario.obstacles):
         raise SolverError(
             f"the controller knows other obstacles than {scenario.name!r}: {list(known)}, and not "
@@ -106,7 +123,7 @@ def simulate(
         )
     except SolverError as error:
         raise SolverError(f"{scenario.name!r}: {error}") from error
-    return drive(scenario, controller, crowd=crowd, max_time=max_time)
+    return drive(scenario, controller, LoopSettings(crowd=crowd, max_time=max_time))
 
 
 def _list_numbers(obstacles: Iterable[Obstacle]) -> list[tuple[Any, ...]]:
@@ -115,16 +132,7 @@ def _list_numbers(obstacles: Iterable[Obstacle]) -> list[tuple[Any, ...]]:
 
 
 def drive(
-    scenario: Scenario,
-    controller: Controller,
-    *,
-    behaviour: CrowdModel = UNAFFECTED,
-    crowd: Crowd | None = None,
-    seed: int = 0,
-    zone_transform: ZoneTransform | None = None,
-    settings: MPCSettings | None = None,
-    max_time: float | None = None,
-    until_arrival: bool = True,
+    scenario: Scenario, controller: Controller, loop: LoopSettings | None = None
 ) -> SimulationLog:
     """Run the loop from any start, without the checks of `simulate`, and with any behaviour of people.
 
@@ -132,152 +140,116 @@ def drive(
     ----------
     scenario : the scene.
     controller : an `MPCCBF`, or any other `szlib.control.Controller`.
-    behaviour : how people move and how the controller sees them.
-    crowd : the true people, in place of those of `behaviour`. If the scenario has people, the crowd must have
-        as many, and their zones apply; else each person has the zone with which they first appear.
-    seed : seed of the behaviour.
-    zone_transform : makes the zone that the robot keeps out of from each person's own zone, or the
-        controller's, or `BODY_ZONE`; from the smallest circle around it for a person without a heading.
-    settings : settings of the measurements (dt, r_robot, eps, zone_speed); default: the controller's.
-    max_time : time limit [s]; default: the scenario's duration.
-    until_arrival : False: run to the time limit, so that a robot at its goal may still have to make room.
+    loop : how the loop runs; default: `LoopSettings()`.
 
     Raises
     ------
     SolverError : a control is not finite, the crowd changes its size, or the controller's dt is not that of
-        `settings`. For an `MPCCBF` also: the goal lies too close to a wall.
+        `loop.settings`. For an `MPCCBF` also: the goal lies too close to a wall.
 
     Examples
     --------
     >>> import szlib
-    >>> turning = szlib.simulation.Behaviour(turn=1.5)
+    >>> from szlib.simulation import Behaviour, LoopSettings
+    >>> turning = LoopSettings(behaviour=Behaviour(turn=1.5), seed=1)
     >>> zone = szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))
-    >>> scenario = szlib.MEETINGS["frontal approach"]
-    >>> log = szlib.simulation.drive(scenario, szlib.MPCCBF(zone), behaviour=turning, seed=1)
+    >>> log = szlib.drive(szlib.MEETINGS["frontal approach"], szlib.MPCCBF(zone), turning)
     >>> log.metrics()["unflagged_overlaps"]
     0
     """
+    loop = loop or LoopSettings()
     controller = as_controller(controller)
-    s, robot = _choose_settings(controller, settings), controller.robot
-    default_zone = BODY_ZONE if controller.zone is None else controller.zone
-    zones = ZoneAssignment(default_zone, zone_transform, s.zone_speed)
-    people = tuple(
-        replace(p, zone=zones.zone_of(i, p)) for i, p in enumerate(scenario.people)
-    )
-    if crowd is None:
-        crowd = behaviour.start(replace(scenario, people=people), seed)
-    end = scenario.duration if max_time is None else max_time
-    goal, dt, rng = scenario.goal, s.dt, np.random.default_rng([seed, 2])
-    gx, gy = goal.tolist()
+    settings = loop.settings or controller.settings or MPCSettings()
+    if controller.settings and controller.settings.dt != settings.dt:
+        raise SolverError(
+            f"the controller steps every {controller.settings.dt} s, the loop every {settings.dt} s; give one"
+        )
+    robot = controller.robot
+    zone = BODY_ZONE if controller.zone is None else controller.zone
+    people = _People(scenario, zone, loop, settings)
+    recorder = _Recorder()
+    duration = scenario.duration if loop.max_time is None else loop.max_time
     arrival: int | None = None
     controller.reset()
-    own, numbers = robot.start(scenario.start), list[float | None]()
-    states, controls, seen_by_step = list[Array](), list[Array](), list[list[int]]()
-    reported: dict[str, list[Any]] = {name: [] for name in (*_UNREPORTED, "solve_time")}
-    for k in range(round(end / dt) + 1):
+    own = robot.start(scenario.start)
+    for k in range(round(duration / settings.dt) + 1):
+        time = k * settings.dt
         state = robot.body(own)
-        everyone = zones.assign(crowd(k * dt, state))
-        for p in everyone:
-            numbers += _ABSENT if p is None else (*p.position, p.heading, *p.velocity)
-        present = [i for i, p in enumerate(everyone) if p is not None]
-        observed = behaviour.observe(tuple([p for p in everyone if p is not None]), rng)
-        seen_by_step.append(
-            [i for i, p in zip(present, observed, strict=True) if p is not None]
-        )
-        seen = tuple([p for p in observed if p is not None])
+        everyone = people.locate(time, state)
+        seen = people.observe(everyone)
         begin = perf_counter()
-        step = controller.step(own, goal, seen)
-        defaults = {**_UNREPORTED, "solve_time": perf_counter() - begin}
-        for name, column in reported.items():
-            column.append(getattr(step, name, defaults[name]))
-        control = np.asarray(step.control, float)
-        states.append(state)
-        controls.append(control)
-        x, y, vx, vy = state.tolist()
-        if (
-            arrival is None
-            and hypot(vx, vy) <= STOPPED_SPEED
-            and hypot(x - gx, y - gy) <= GOAL_RADIUS
-        ):
+        step = controller.step(own, scenario.goal, tuple(seen.values()))
+        recorder.add(state, everyone, list(seen), step, perf_counter() - begin)
+        is_near = np.hypot(*(state[:2] - scenario.goal)) <= GOAL_RADIUS
+        if arrival is None and is_near and np.hypot(*state[2:]) <= STOPPED_SPEED:
             arrival = k
-            if until_arrival:
+            if loop.until_arrival:
                 break
-        if not all(map(isfinite, given := control.tolist())):
+        control = recorder.controls[-1]
+        if not np.isfinite(control).all():
             raise SolverError(
-                f"{scenario.name!r}: the controller gave {given} at {k * dt:g} s"
+                f"{scenario.name!r}: the controller gave {control.tolist()} at {time:g} s"
             )
-        own = robot.advance(own, control, dt)
-    n, n_people = len(states), len(everyone)
+        own = robot.advance(own, control, settings.dt)
     return SimulationLog(
         scenario=scenario,
-        settings=s,
-        zones=tuple(zones.zone_of(i, None) for i in range(n_people)),
-        states=np.array(states),
-        controls=np.array(controls),
-        people=_fill_headings(np.reshape(np.array(numbers, float), (n, n_people, 5))),
-        predicted=_stack_plans(reported["predicted"]),
-        residual=_align_residuals(
-            reported["residual"], seen_by_step, n_people, len(scenario.fixed)
-        ),
-        status=np.array(reported["status"]),
-        safe=np.array(reported["safe"], bool),
-        **{
-            name: np.array(reported[name], float)
-            for name in ("slack", "solve_time", "stuck")
-        },
+        settings=settings,
+        zones=people.zones(len(everyone)),
         arrival=arrival,
-        has_safety_claims=reported["safe"][0] is not None,
         inputs=tuple(robot.inputs),
+        **recorder.collect(len(everyone), len(scenario.fixed)),
     )
 
 
-def _choose_settings(
-    controller: Controller, settings: MPCSettings | None
-) -> MPCSettings:
-    own = controller.settings
-    if settings and own and settings.dt != own.dt:
-        raise SolverError(
-            f"the controller steps every {own.dt} s, the loop every {settings.dt} s; give one"
-        )
-    return settings or own or MPCSettings()
+class _People:
+    """The people of a run with their zones, and what the controller sees of them.
 
-
-class ZoneAssignment:
-    """The zone that the robot keeps out of for each person, from when they first appear.
-
-    Parameters
-    ----------
-    default : zone of people who have none.
-    transform : makes the zone from each person's own; None: it is their own.
-    speed : walking speed for zones that depend on it [m/s].
+    Each person has a zone from when they first appear.  People of the `scenario` have theirs at once.
     """
 
     def __init__(
         self,
+        scenario: Scenario,
         default: Ellipse | SpeedZone,
-        transform: ZoneTransform | None,
-        speed: float,
+        loop: LoopSettings,
+        settings: MPCSettings,
     ) -> None:
-        self._default, self._transform, self._speed = default, transform, speed
+        self._default = default
+        self._loop = loop
+        self._speed = settings.zone_speed
         self._zones: dict[int, Ellipse] = {}
-        self._n_people: int | None = None
+        self._rng = np.random.default_rng([loop.seed, 2])
+        people = tuple(
+            replace(p, zone=self._zone_of(i, p)) for i, p in enumerate(scenario.people)
+        )
+        self._n_people = len(people) or None
+        crowd = loop.crowd
+        if crowd is None:
+            crowd = loop.behaviour.start(replace(scenario, people=people), loop.seed)
+        self._crowd = crowd
 
-    def zone_of(self, i: int, person: Person | None) -> Ellipse:
+    def _zone_of(self, i: int, person: Person | None) -> Ellipse:
         """The zone of person `i`, made from the `person` at the first call; None: they never appear."""
         if i not in self._zones:
-            own = (
-                self._default if person is None or person.zone is None else person.zone
-            )
+            own = self._default
+            if person is not None and person.zone is not None:
+                own = person.zone
             zone = as_ellipse(own, self._speed)
             if person is not None and person.heading is None:
                 zone = circle_around(zone)
-            self._zones[i] = self._transform(zone) if self._transform else zone
+            transform = self._loop.zone_transform
+            self._zones[i] = transform(zone) if transform else zone
         return self._zones[i]
 
-    def assign(self, people: Sequence[Person | None]) -> Sequence[Person | None]:
-        """The `people` with their zones; SolverError if their number changes."""
+    def zones(self, n: int) -> tuple[Ellipse, ...]:
+        """The zones of all `n` people."""
+        return tuple(self._zone_of(i, None) for i in range(n))
+
+    def locate(self, time: float, robot: Array) -> list[Person | None]:
+        """The people at a `time` [s] with their zones; SolverError if their number changes."""
+        people = self._crowd(time, robot)
         if self._n_people is None:
-            self._n_people = len(self._zones) or len(people)
+            self._n_people = len(people)
         if len(people) != self._n_people:
             raise SolverError(
                 "the number of people in a crowd must not change, use None for people who are absent; it was "
@@ -286,29 +258,79 @@ class ZoneAssignment:
         return [
             p
             if p is None or p.zone is self._zones.get(i, self)
-            else replace(p, zone=self.zone_of(i, p))
+            else replace(p, zone=self._zone_of(i, p))
             for i, p in enumerate(people)
         ]
 
+    def observe(self, everyone: Sequence[Person | None]) -> dict[int, Person]:
+        """The people whom the controller sees, by their place among `everyone`."""
+        present = {i: p for i, p in enumerate(everyone) if p is not None}
+        observed = self._loop.behaviour.observe(tuple(present.values()), self._rng)
+        pairs = zip(present, observed, strict=True)
+        return {i: p for i, p in pairs if p is not None}
 
-def _fill_headings(people: Array) -> Array:
-    """Replace missing headings of people who are present by their last known heading, or 0."""
-    headings, is_present = people[:, :, 2], ~np.isnan(people[:, :, 0])
-    if np.isnan(headings[is_present]).any():
-        known = pd.DataFrame(headings).ffill().fillna(0.0).to_numpy()
-        people[:, :, 2] = np.where(is_present, known, np.nan)
-    return people
+
+class _Recorder:
+    """What is recorded of each step of a run."""
+
+    def __init__(self) -> None:
+        self.controls: list[Array] = []
+        self._states: list[Array] = []
+        self._people: list[float] = []
+        self._headings: dict[int, float] = {}  # the last known of each person
+        self._seen: list[list[int]] = []
+        self._reported: dict[str, list[Any]] = {name: [] for name in _UNREPORTED}
+
+    def add(
+        self,
+        state: Array,
+        everyone: Sequence[Person | None],
+        seen: list[int],
+        step: Any,
+        duration: float,
+    ) -> None:
+        """Record a `step`, which took a `duration` [s], and the places of the people `seen`."""
+        self._states.append(state)
+        self.controls.append(np.asarray(step.control, float))
+        self._seen.append(seen)
+        for i, person in enumerate(everyone):
+            if person is None:
+                self._people += _ABSENT
+                continue
+            if person.heading is not None:
+                self._headings[i] = person.heading
+            heading = self._headings.get(i, 0.0)
+            self._people += (*person.position, heading, *person.velocity)
+        for name, column in self._reported.items():
+            column.append(getattr(step, name, _UNREPORTED[name]))
+        if self._reported["solve_time"][-1] is None:
+            self._reported["solve_time"][-1] = duration
+
+    def collect(self, n_people: int, n_fixed: int) -> dict[str, Any]:
+        """The arrays of the run, as of `Run`."""
+        reported = self._reported
+        numbers = ("slack", "solve_time", "stuck")
+        return {
+            "states": np.array(self._states),
+            "controls": np.array(self.controls),
+            "people": np.reshape(self._people, (len(self._states), n_people, 5)),
+            "predicted": _stack_plans(reported["predicted"]),
+            "residual": _align_residuals(
+                reported["residual"], self._seen, n_people, n_fixed
+            ),
+            "status": np.array(reported["status"]),
+            "safe": np.array(reported["safe"], bool),
+            "has_safety_claims": reported["safe"][0] is not None,
+            **{name: np.array(reported[name], float) for name in numbers},
+        }
 
 
 def _stack_plans(plans: Sequence[Array]) -> Array:
     """The plan of each step, shape (n, N+1, 4); (n, 0, 4) if there are none, NaN after shorter ones."""
-    longest = max(map(len, plans))
-    return np.array(
-        [
-            np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan)
-            for p in plans
-        ]
-    )
+    stacked = np.full((len(plans), max(map(len, plans)), 4), np.nan)
+    for row, plan in zip(stacked, plans, strict=True):
+        row[: len(plan)] = plan
+    return stacked
 
 
 def _align_residuals(

@@ -8,26 +8,27 @@ from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
 
 from .. import __version__
+from ..control import MPCSettings, Person
 from ..control.obstacles import describe, number_kinds, restore
-from ..control.people import Person
-from ..control.settings import MPCSettings
 from ..errors import DataError, SzlibError
 from ..files import write_file
 from ..input_files import open_regular, read_small
 from ..zones.ellipses import Ellipse
 from .metrics import compute_metrics
-from .run import Run, nanmin
+from .robot_run import Run, nanmin
 from .scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FORMAT, _VERSION = "szlib.SimulationLog", 5
+_FORMAT = "szlib.SimulationLog"
+_VERSION = 6
 _ARRAYS = (
     "states", "controls", "people", "predicted", "residual", "status", "safe", "slack", "solve_time",
     "stuck",
@@ -73,24 +74,18 @@ class SimulationLog(Run):
         person_i_x, person_i_y [m], person_i_heading [rad], h_person_i, h_wall_j [m].
         """
         n = len(self.zones)
-        columns: dict[str, Any] = {"t": self.time}
-        columns |= dict(zip(("x", "y", "vx", "vy"), self.states.T, strict=True)) | {
-            "speed": self.speed
+        columns: dict[str, Any] = {
+            "t": self.time,
+            **dict(zip(("x", "y", "vx", "vy"), self.states.T, strict=True)),
+            "speed": self.speed,
+            **dict(zip(self.inputs, self.controls.T, strict=True)),
+            **_pick(self, "status", "slack", "solve_time", "stuck"),
+            "cbf_people": self.cbf_people,
+            "clearance": nanmin(self.clearance, axis=1),
         }
-        columns |= dict(zip(self.inputs, self.controls.T, strict=True))
-        columns |= {
-            name: getattr(self, name)
-            for name in ("status", "slack", "solve_time", "stuck")
-        }
-        columns["cbf_people"] = self.cbf_people
-        columns["clearance"] = nanmin(self.clearance, axis=1)
         for i in range(n):
-            x, y, heading = self.people[:, i, :3].T
-            columns |= {
-                f"person_{i}_x": x,
-                f"person_{i}_y": y,
-                f"person_{i}_heading": heading,
-            }
+            for k, name in enumerate(("x", "y", "heading")):
+                columns[f"person_{i}_{name}"] = self.people[:, i, k]
             columns[f"h_person_{i}"] = self.h[:, i]
         names = number_kinds(self.scenario.fixed)
         columns |= {f"h_{name}": self.h[:, n + j] for j, name in enumerate(names)}
@@ -130,7 +125,7 @@ class SimulationLog(Run):
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the run to ``<path>.parquet`` (its arrays) and ``<path>.json`` (all else).
+        """Write the run to ``<path>.npz`` (its arrays) and ``<path>.json`` (all else).
 
         A suffix of `path` is ignored.  Claims are functions and are not saved.
 
@@ -138,37 +133,31 @@ class SimulationLog(Run):
         ------
         DataError : a file cannot be written.
         """
-        stem, rows = Path(path).with_suffix(""), len(self.states)
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        flat = {
-            name: list(a.reshape(rows, -1)) if a.ndim > 1 else a
-            for name, a in arrays.items()
-        }
-        scenario, people = self.scenario, self.scenario.people
+        stem = Path(path).with_suffix("")
+        scenario = self.scenario
+        scene = _pick(scenario, "name", "title", "duration")
+        for name in ("start", "goal", "walls"):
+            scene[name] = getattr(scenario, name).tolist()
+        scene["obstacles"] = [describe(each) for each in scenario.obstacles]
         content = {
             "format": _FORMAT,
             "version": _VERSION,
             "szlib": __version__,
             "units": "m, s, rad; world frame, zones in the frame of their person",
             "run": _pick(self, "arrival", "has_safety_claims", "inputs"),
-            "shapes": {name: a.shape for name, a in arrays.items() if a.ndim == 3},
             "settings": asdict(self.settings),
             "zones": [
-                _pick(zone, "center", "semi_axes", "angle") for zone in self.zones
+                _pick(each, "center", "semi_axes", "angle") for each in self.zones
             ],
-            "scenario": _pick(scenario, "name", "title", "duration")
-            | {
-                name: getattr(scenario, name).tolist()
-                for name in ("start", "goal", "walls")
-            }
-            | {"obstacles": [describe(each) for each in scenario.obstacles]},
+            "scenario": scene,
             "people": [
-                _pick(person, "position", "velocity", "heading") for person in people
+                _pick(each, "position", "velocity", "heading")
+                for each in scenario.people
             ],
         }
         buffer = io.BytesIO()
-        pd.DataFrame(flat).to_parquet(buffer)
-        write_file(stem.with_suffix(".parquet"), buffer.getvalue())
+        np.savez_compressed(buffer, **_pick(self, *_ARRAYS))
+        write_file(stem.with_suffix(".npz"), buffer.getvalue())
         write_file(stem.with_suffix(".json"), json.dumps(content, indent=1))
 
     @classmethod
@@ -186,27 +175,32 @@ class SimulationLog(Run):
                 raise ValueError(
                     f"format {content['format']} {content['version']}, expected {_FORMAT} {_VERSION}"
                 )
-            with open_regular(stem.with_suffix(".parquet")) as stream:
-                rows = pd.read_parquet(stream)
-            arrays: dict[str, Any] = {
-                name: np.array(rows[name].tolist()) for name in _ARRAYS
-            }
-            arrays |= {
-                name: arrays[name].reshape(shape)
-                for name, shape in content["shapes"].items()
-            }
-            zones = tuple(Ellipse(**zone) for zone in content["zones"])
+            with open_regular(stem.with_suffix(".npz")) as stream:
+                arrays = dict(np.load(stream))
+            zones = tuple(Ellipse(**each) for each in content["zones"])
             people = tuple(
-                Person(**person, zone=zones[i] if i < len(zones) else None)
-                for i, person in enumerate(content["people"])
+                Person(**person, zone=zone)
+                for person, zone in zip(content["people"], zones, strict=False)
             )
-            own = content["scenario"]
-            own["obstacles"] = [restore(each) for each in own["obstacles"]]
-            scenario = Scenario(**own, people=people)
-            settings = MPCSettings(**content["settings"])
-            content["run"]["inputs"] = tuple(content["run"]["inputs"])
-            return cls(scenario, settings, zones, **arrays, **content["run"])
-        except (OSError, KeyError, TypeError, ValueError, SzlibError) as error:
+            scene = content["scenario"]
+            run = content["run"]
+            run["inputs"] = tuple(run["inputs"])
+            scene["obstacles"] = [restore(each) for each in scene["obstacles"]]
+            return cls(
+                Scenario(**scene, people=people),
+                MPCSettings(**content["settings"]),
+                zones,
+                **arrays,
+                **run,
+            )
+        except (
+            OSError,
+            KeyError,
+            TypeError,
+            ValueError,
+            BadZipFile,
+            SzlibError,
+        ) as error:
             raise DataError(
                 f"{stem}: cannot be read as a run ({error!r}); expected the two files of SimulationLog.save"
             ) from error

@@ -1,4 +1,4 @@
-"""Metrics of the motion of a run: one dictionary for scenarios, random worlds and comparisons.
+"""A run in numbers and words: one dictionary of metrics, how the run ends, and what the robot does.
 
 People who are absent at a time are left out at that time.
 
@@ -8,16 +8,16 @@ Source: A. Francis et al., "Principles and guidelines for evaluating social robo
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from ..checks import Array
+from ..control import STATUSES, Obstacles, Zone
 from ..control.settings import TOLERANCE
-from ..control.step import STATUSES
-from .outcomes import classify_outcome
-from .run import Run, nanmin
+from .robot_run import Run, nanmin
 from .scenario import GOAL_RADIUS, STOPPED_SPEED
 
 START_UP_TIME = 1.0  # time after the start that does not count as slow or yielding [s]: v_max / a_max
@@ -33,6 +33,38 @@ SOLVE_TIMES = {
     "solve_time_p99": 0.99,
     "solve_time_max": 1.0,
 }
+
+Outcome = Literal[
+    "arrived",
+    "hit wall",
+    "run into",
+    "squeezed",
+    "drove in",
+    "boxed in",
+    "deadlock",
+    "out of time",
+]
+"""How a run ends; see `classify_outcome`."""
+# if two barriers are below this h, the robot has no way out [m] (assumed)
+CROWDED_H = 0.2
+STOP_WINDOW = 3.0  # a robot that stands for this time at the end of a run has stopped for good [s] (assumed)
+_CELL = 0.1  # cell size of the grid for the search of a free path to the goal [m]
+_MARGIN = 2.5  # margin of the grid around everything: enough for a zone and the robot beside it [m]
+
+Strategy = Literal[
+    "goes ahead",
+    "waits",
+    "backs out",
+    "passes on the other side",
+    "deadlock",
+    "infeasible",
+    "h < 0",
+]
+"""What a robot does in a run; see `classify_strategy`."""
+STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
+MIN_WAIT = 1.0  # a robot that yields for this time waits [s] (assumed)
+# a robot that goes back by this distance, its radius, backs out [m] (assumed)
+MIN_RETREAT = 0.5
 
 
 def compute_metrics(run: Run) -> dict[str, Any]:
@@ -69,12 +101,15 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     -----
     A step counts if its control is applied.  The step of the last state does not count.
     """
-    dt, n_people, way, applied = (
-        run.settings.dt,
-        len(run.zones),
-        run.until_arrival,
-        slice(0, -1),
-    )
+    dt = run.settings.dt
+    n_people = len(run.zones)
+    way = run.until_arrival
+    applied = slice(0, -1)
+    parts = {
+        "": slice(None),
+        "_people": slice(n_people),
+        "_walls": slice(n_people, None),
+    }
     speed = run.speed[way]
     time = dt * np.arange(len(speed))
     jerk = np.diff(np.diff(run.states[way, 2:], axis=0), axis=0) / dt**2
@@ -92,12 +127,11 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "outcome": classify_outcome(run),
         "time_to_goal": np.nan if run.arrival is None else round(dt * run.arrival, 9),
         "path_length": measure_path_length(run.states[way, :2]),
-        "min_h": _min_or_nan(run.h),
-        "min_h_people": _min_or_nan(run.h[:, :n_people]),
-        "min_h_walls": _min_or_nan(run.h[:, n_people:]),
-        "min_clearance": _min_or_nan(run.clearance),
-        "min_clearance_people": _min_or_nan(run.clearance[:, :n_people]),
-        "min_clearance_walls": _min_or_nan(run.clearance[:, n_people:]),
+        **{f"min_h{of}": _min_or_nan(run.h[:, part]) for of, part in parts.items()},
+        **{
+            f"min_clearance{of}": _min_or_nan(run.clearance[:, part])
+            for of, part in parts.items()
+        },
         "min_speed": float(
             speed[(time >= START_UP_TIME) & cruising].min(initial=speed.max())
         ),
@@ -196,7 +230,8 @@ def find_avoidance_start(
     -------
     (distance, h) [m], interpolated between two states; NaN if the robot stays on the line.
     """
-    start, course = run.scenario.start[:2], run.scenario.goal - run.scenario.start[:2]
+    start = run.scenario.start[:2]
+    course = run.scenario.goal - run.scenario.start[:2]
     beside = run.states[:, :2] - start
     beside = np.abs(beside[:, 0] * course[1] - beside[:, 1] * course[0]) / np.hypot(
         *course
@@ -204,14 +239,121 @@ def find_avoidance_start(
     rows = np.flatnonzero(beside > deviation)
     if not len(rows):
         return np.nan, np.nan
-    last, first = max(int(rows[0]) - 1, 0), int(rows[0])
-    share = (
-        (deviation - beside[last]) / (beside[first] - beside[last])
-        if first > last
-        else 1.0
-    )
-    ahead, left = locate_along_course(run, person)
-    x, y, h = (
-        v[last] + share * (v[first] - v[last]) for v in (ahead, left, run.h[:, person])
-    )
+    first = int(rows[0])
+    last = max(first - 1, 0)
+    share = 1.0
+    if first > last:
+        share = (deviation - beside[last]) / (beside[first] - beside[last])
+    values = np.stack([*locate_along_course(run, person), run.h[:, person]])
+    x, y, h = values[:, last] + share * (values[:, first] - values[:, last])
     return float(np.hypot(x, y)), float(h)
+
+
+def classify_outcome(run: Run) -> Outcome:
+    """How a `run` ends.  Where a barrier is violated, how the first violation begins.
+
+    Returns
+    -------
+    "arrived" : the robot is at rest at the goal, and h >= 0 at all states.
+    "hit wall" : h of a wall is the first below 0.
+    "run into" : h of a person is the first below 0, and the person approached faster than the robot.
+    "squeezed" : the same, and another barrier is below `CROWDED_H`.
+    "drove in" : h of a person is the first below 0, and the robot approached faster than the person.
+    "boxed in" : the robot has stopped, and no free path leads to the goal.
+    "deadlock" : the robot has stopped although a free path leads to the goal.
+    "out of time" : the robot is still moving at the end.
+    """
+    violated = np.flatnonzero(nanmin(run.h, axis=1) < -TOLERANCE)
+    if len(violated):
+        return _classify_violation(run, int(violated[0]))
+    if run.success:
+        return "arrived"
+    window = round(STOP_WINDOW / run.settings.dt)
+    if run.speed[-window:].max() > STOPPED_SPEED:
+        return "out of time"
+    return "deadlock" if _has_free_path(run) else "boxed in"
+
+
+def _classify_violation(run: Run, k: int) -> Outcome:
+    """Who violates the barrier at state k; a person who was absent before came to the robot."""
+    i = int(np.nanargmin(run.h[k]))
+    if i >= len(run.zones):
+        return "hit wall"
+    before = max(k - 1, 0)
+    direction = run.states[before, :2] - run.people[before, i, :2]
+    direction = direction / np.hypot(*direction)
+    approach_of_person = (run.people[k, i, :2] - run.people[before, i, :2]) @ direction
+    approach_of_robot = -(run.states[k, :2] - run.states[before, :2]) @ direction
+    if approach_of_robot > approach_of_person:
+        return "drove in"
+    return "squeezed" if (run.h[k] < CROWDED_H).sum() > 1 else "run into"
+
+
+def _has_free_path(run: Run) -> bool:
+    """True if a path with h >= 0 leads from the robot to the goal, with people at their last positions."""
+    zones = list[Zone]()
+    for i in np.flatnonzero(run.is_present[-1]):
+        x, y, heading = run.people[-1, i, :3].tolist()
+        zones.append(Zone(*Zone.place(run.zones[i], (x, y), heading, (0.0, 0.0))))
+    ends = np.array([run.states[-1, :2], run.scenario.goal])
+    places = [ends, run.people[-1, :, :2], run.scenario.walls.reshape(-1, 2)]
+    everything = np.vstack(places)
+    low = np.nanmin(everything, axis=0) - _MARGIN
+    high = np.nanmax(everything, axis=0) + _MARGIN
+    axes = [np.arange(low[i], high[i], _CELL) for i in range(2)]
+    cells = np.meshgrid(*axes, indexing="ij")
+    obstacles = Obstacles.of([*zones, *run.scenario.fixed], run.settings)
+    is_free = nanmin(obstacles.h(*cells), axis=0) >= 0
+    regions = label(is_free, structure=np.ones((3, 3)))[0]
+    reached = list[set[int]]()
+    for i, j in np.round((ends - low) / _CELL).astype(int):
+        around = regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
+        reached.append(set(around.ravel().tolist()) - {0})
+    return not reached[0].isdisjoint(reached[1])
+
+
+def classify_strategy(run: Run) -> Strategy:
+    """What the robot does in a `run`: the first of these that holds.
+
+    Returns
+    -------
+    "h < 0" : it enters a zone, or comes too near to a wall, at some state.
+    "infeasible" : some step that is applied has no plan that satisfies the hard problem.
+    "deadlock" : it does not come to rest at the goal in time.
+    "backs out" : it goes back by `MIN_RETREAT` (see `compute_retreat`).
+    "waits" : it yields for `MIN_WAIT` in all (see `find_yielding_steps`).
+    "passes on the other side" : it passes a person on the side that is not `MPCSettings.pass_side`.
+    "goes ahead" : none of these.
+
+    Notes
+    -----
+    A controller that does not report its conditions is never "infeasible" and never "waits".
+    """
+    metrics = compute_metrics(run)
+    if (nanmin(run.h, axis=1) < -TOLERANCE).any():
+        return "h < 0"
+    if metrics["infeasible_steps"]:
+        return "infeasible"
+    if not run.success:
+        return "deadlock"
+    if compute_retreat(run) >= MIN_RETREAT:
+        return "backs out"
+    if metrics["time_yielding"] >= MIN_WAIT:
+        return "waits"
+    if find_passing_side(run) not in ("none", run.settings.pass_side):
+        return "passes on the other side"
+    return "goes ahead"
+
+
+def compute_retreat(run: Run) -> float:
+    """Largest distance by which the robot of a `run` goes back along the line from start to goal [m].
+
+    It is measured from the farthest point that the robot has reached so far.
+    """
+    course = run.scenario.goal - run.scenario.start[:2]
+    along = (
+        (run.states[:, :2] - run.scenario.start[:2])
+        @ course
+        / max(float(np.hypot(*course)), 1e-12)
+    )
+    return float((np.maximum.accumulate(along) - along).max())

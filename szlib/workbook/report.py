@@ -33,7 +33,7 @@ from ..errors import DataError, SzlibError
 from ..files import MARKER, folder_purpose, write_file
 from ..input_files import open_regular, printable, read_json_object, read_small
 from ..plaza.settings import PlazaSettings
-from ..simulation.scenarios.paper import SCENARIOS
+from ..simulation import SCENARIOS
 from ..tracks import datasets, funnels
 from ..zones.social_zone import SocialZone
 from . import folders

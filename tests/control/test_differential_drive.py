@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from studies.distances import euclidean_to_segment
+from studies.distances import euclidean_to_ellipse, euclidean_to_segment
 
 import szlib
 from szlib.control.differential_drive import Unicycle
 from szlib.control.obstacles import ellipse_distance, segment_distance
 from szlib.control.settings import TOLERANCE
-from szlib.control.verification import euclidean_to_ellipse
-from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone
+from szlib.simulation.scenario import Worlds, draw_zone
 from szlib.zones.ellipses import BODY_RADIUS
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)

@@ -6,10 +6,10 @@ import helpers.ros_stubs as ros
 import numpy as np
 import pytest
 from helpers.ros_stubs import Node, goal, grid, hear, odometry, people
+from studies.distances import euclidean_to_ellipse
 
 import szlib
 from szlib.control.differential_drive import Unicycle
-from szlib.control.verification import euclidean_to_ellipse
 from szlib.zones.polar import DIRECTIONS, PolarZone
 
 ZONE = szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)

@@ -10,7 +10,7 @@ from helpers.random_states import ZONE, questions
 import szlib
 from szlib.control import Priority
 from szlib.control.controller import advance
-from szlib.simulation.closed_loop import drive
+from szlib.simulation.closed_loop import LoopSettings, drive
 from szlib.zones.ellipses import BODY_RADIUS
 
 SOLVERS = ("sqp", "ipopt")
@@ -51,7 +51,7 @@ def end_of_wall(margin):
     return drive(
         scenario,
         controller_of(walls=wall, margin=margin, gamma=0.5, N_h=8, guard=False),
-        until_arrival=False,
+        LoopSettings(until_arrival=False),
     )
 
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from studies.distances import euclidean_to_ellipse
 
 import szlib
 from szlib.control import controller as base
 from szlib.control.controller import OLDEST_STATE, STUCK_AFTER, advance
 from szlib.control.differential_drive import Unicycle
-from szlib.control.verification import euclidean_to_ellipse
 from szlib.zones.ellipses import BODY_RADIUS
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))

@@ -13,12 +13,11 @@ from helpers.random_states import questions
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
-from studies.distances import euclidean_to_segment
+from studies.distances import euclidean_to_ellipse, euclidean_to_segment
 
 import szlib
 from szlib.control import HalfPlane, Wall, verification
 from szlib.control.obstacles import Obstacles
-from szlib.control.verification import euclidean_to_ellipse
 
 coordinate = st.floats(-3, 3, allow_subnormal=False)
 points = st.tuples(coordinate, coordinate)

@@ -4,13 +4,12 @@ import numpy as np
 from helpers.speed_model import SpeedModel
 
 from szlib.control.people import Person
-from szlib.simulation.crowds.reacting import MODELS
-from szlib.simulation.crowds.walking_model import ModelFactory
+from szlib.simulation.crowds import WALKING_MODELS, ModelFactory
 from szlib.simulation.scenario import Scenario
 
-PACKAGES = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}
-"""The package of each model."""
-FACTORIES: dict[str, ModelFactory] = {**MODELS, "speed model": SpeedModel}
+PACKAGES = {"orca": "pyrvo", "speed model": "jupedsim"}
+"""The package of each model that needs one."""
+FACTORIES: dict[str, ModelFactory] = {**WALKING_MODELS, "speed model": SpeedModel}
 """Every model by name: those of szlib, and one that is written here."""
 
 

@@ -16,7 +16,7 @@ import shapely
 
 from szlib.checks import Array
 from szlib.errors import SolverError
-from szlib.simulation.crowds.walking_model import Walkers, import_package
+from szlib.simulation.crowds import Walkers
 
 INSTALL_JUPEDSIM = "pip install --no-deps jupedsim deprecated wrapt"
 TICK = 0.01
@@ -31,10 +31,9 @@ class SpeedModel:
     """`walkers` who walk as fast as the gap ahead allows: a `WalkingModel`."""
 
     def __init__(self, walkers: Walkers) -> None:
-        self._jps, self._r_robot = (
-            import_package("jupedsim", INSTALL_JUPEDSIM),
-            walkers.r_robot,
-        )
+        import jupedsim
+
+        self._jps, self._r_robot = jupedsim, walkers.r_robot
         self._floor = _make_floor(walkers)
         model = self._jps.CollisionFreeSpeedModel()
         self._sim: Any = self._jps.Simulation(

@@ -10,7 +10,7 @@ import numpy as np
 from controller import attack_worlds
 
 import szlib
-from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.simulation.scenario import Worlds
 
 WORLDS = {False: 4, True: 20_000}
 CROWDS = {False: 1, True: 2_000}

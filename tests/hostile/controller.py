@@ -15,7 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 import szlib
-from szlib.simulation.monte_carlo import rerun_world
+from szlib.simulation.monte_carlo import RolloutSetup
 
 BODY = 0.25
 TOLERANCE = 1e-6
@@ -343,7 +343,7 @@ def attack_steps(
 def attack_worlds(seeds: range, tally: Counter[str], **parameters: Any) -> None:
     """Whole runs: motion, barriers, overlaps, and what was said of them, from the states alone."""
     for seed in tqdm(seeds, unit="world", leave=False):
-        log = rerun_world(seed, **parameters)
+        log = RolloutSetup(**parameters).run(seed)
         judge = Judge(log.settings, list(log.scenario.walls), list(log.scenario.people))
         dt, x, u = log.settings.dt, log.states, log.controls[:-1]
         times = dt * np.arange(len(x))

@@ -30,8 +30,8 @@ from szlib import files
 from szlib.errors import DataError, StorageError, ZoneError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.simulation.monte_carlo import rollouts
-from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.simulation.monte_carlo import RolloutSetup, rollouts
+from szlib.simulation.scenario import Worlds
 from szlib.workbook.record import NotebookRecord, ZoneMethod
 
 DAMAGES = {False: 2, True: 300}
@@ -186,7 +186,7 @@ def _extract(data: Path, out: Path) -> None:
 
 
 def _rollouts(_: Path, out: Path) -> None:
-    rollouts(2, worlds=Worlds(duration=0.5), out=out, progress=False)
+    rollouts(2, RolloutSetup(worlds=Worlds(duration=0.5)), out=out, progress=False)
 
 
 class _Quick(ZoneMethod):

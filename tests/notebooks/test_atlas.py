@@ -10,7 +10,7 @@ from studies.atlas import CANNOT_START, REFERENCE, SCENES, AtlasCell, run_atlas
 
 import szlib
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.strategies import (
+from szlib.simulation.metrics import (
     MIN_RETREAT,
     STRATEGIES,
     classify_strategy,
@@ -135,5 +135,7 @@ def test_the_controller_decides_again_at_each_time_of_a_run() -> None:
         controller.reset()
         control = controller.step(*log.controller_inputs(time)).control
         assert control == pytest.approx(log.controls[round(10 * time)], abs=1e-3)
-    with pytest.raises(szlib.DataError, match="times from 0 to"):
+    with pytest.raises(
+        szlib.DataError, match="time must be a time of the run, from 0 to"
+    ):
         log.controller_inputs(1e3)

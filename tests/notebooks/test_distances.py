@@ -12,6 +12,7 @@ from studies import distances
 from studies.distances import (
     compare_distances,
     compute_distance_error,
+    euclidean_to_ellipse,
     euclidean_to_segment,
     find_safe_boundary,
     plot_distance_error,
@@ -19,7 +20,6 @@ from studies.distances import (
 )
 
 import szlib
-from szlib.control import euclidean_to_ellipse
 
 coordinate = st.floats(-3, 3, allow_subnormal=False)
 points = st.tuples(coordinate, coordinate)

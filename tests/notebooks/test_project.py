@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import szlib
+from szlib.simulation.closed_loop import LoopSettings
 from szlib.workbook import folders
 
 PROJECT = folders.NOTEBOOKS / "project"
@@ -181,7 +182,9 @@ def test_the_motors_have_limits(tmp_path):
     file.write_text(OWN.format(control="np.array([1e9, -1e9])"))
     rocket, world = Submission(file), szlib.MEETINGS["frontal approach"]
     rocket.ask(walls=[], zone=((0, 0), (1, 1), 0))
-    log = szlib.simulation.drive(world, rocket, settings=RULES, max_time=3.0)
+    log = szlib.simulation.drive(
+        world, rocket, LoopSettings(settings=RULES, max_time=3.0)
+    )
     rocket.end()
     rocket.process.communicate()
     assert abs(log.controls).max() <= RULES.a_max + 1e-9

@@ -5,14 +5,14 @@ import pytest
 
 import szlib
 from szlib.simulation.baseline_controllers import (
+    CONTROLLERS,
     DynamicWindowController,
     SocialForceController,
     StraightController,
 )
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.comparisons import CONTROLLERS
-from szlib.simulation.monte_carlo import rollouts
-from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.simulation.monte_carlo import RolloutSetup, rollouts
+from szlib.simulation.scenario import Worlds
 
 SETTINGS = szlib.MPCSettings()
 BASELINES = [StraightController, SocialForceController, DynamicWindowController]
@@ -92,7 +92,9 @@ def test_rotating_the_world_rotates_the_path(factory):
 
 @pytest.mark.parametrize("factory", BASELINES)
 def test_limits_are_kept_in_every_world(factory):
-    rows = rollouts(8, controller=factory, measure=largest, n_jobs=1, progress=False)
+    rows = rollouts(
+        8, RolloutSetup(controller=factory, measure=largest), n_jobs=1, progress=False
+    )
     assert (rows["max_speed"] <= SETTINGS.v_max + 1e-9).all()
     assert (rows["largest"] <= SETTINGS.a_max + 1e-9).all()
 
@@ -106,7 +108,9 @@ STILL = Worlds(standing=1.0, walls=1.0, start_speed=0.0)
 
 @pytest.mark.parametrize("factory", [StraightController, DynamicWindowController])
 def test_baselines_do_not_touch_people_who_stand(factory):
-    rows = rollouts(8, worlds=STILL, controller=factory, n_jobs=1, progress=False)
+    rows = rollouts(
+        8, RolloutSetup(worlds=STILL, controller=factory), n_jobs=1, progress=False
+    )
     assert rows["overlaps"].sum() == 0
     assert rows["success"].any()
 

@@ -7,13 +7,19 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from studies.summaries import summarise
 
 import szlib
-from szlib.simulation.closed_loop import BODY_ZONE, drive
-from szlib.simulation.comparisons import compare, summarise
-from szlib.simulation.monte_carlo import identify, rerun_world, rollouts
-from szlib.simulation.scenario import Behaviour
-from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.simulation.baseline_controllers import make_mpc_cbf
+from szlib.simulation.closed_loop import BODY_ZONE, LoopSettings, drive
+from szlib.simulation.crowds import Behaviour
+from szlib.simulation.monte_carlo import (
+    RolloutSetup,
+    compare,
+    identify,
+    rollouts,
+)
+from szlib.simulation.scenario import Worlds
 from szlib.zones.ellipses import circle_around
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
@@ -294,7 +300,7 @@ def test_a_crowd_model_needs_only_two_methods():
         def observe(self, people, rng):
             return people
 
-    log = drive(WALK, Straight(), behaviour=Circling(), seed=3)
+    log = drive(WALK, Straight(), LoopSettings(behaviour=Circling(), seed=3))
     assert log.people[:, 0, 0] == pytest.approx(np.cos(log.time))
     assert log.zones == (ZONE,)
 
@@ -353,24 +359,27 @@ def test_the_same_obstacles_are_accepted_whatever_object_they_are():
 
 def test_settings_with_another_dt_are_rejected():
     with pytest.raises(szlib.SolverError, match=r"every 0.1 s, the loop every 0.2 s"):
-        drive(WALK, szlib.MPCCBF(ZONE), settings=szlib.MPCSettings(dt=0.2))
+        drive(
+            WALK, szlib.MPCCBF(ZONE), LoopSettings(settings=szlib.MPCSettings(dt=0.2))
+        )
 
 
 # --- rollouts and comparisons ------------------------------------------------------------------------
 
 
 def test_rollouts_accepts_any_controller():
-    rows = rollouts(3, worlds=ALONE, controller=straight, n_jobs=1, progress=False)
+    rows = rollouts(
+        3, RolloutSetup(worlds=ALONE, controller=straight), n_jobs=1, progress=False
+    )
     assert rows["success"].all() and (rows["claimed_safe_steps"] == 0).all()
     slow = rollouts(
         3,
-        worlds=ALONE,
-        controller=partial(straight, pace=0.5),
+        RolloutSetup(worlds=ALONE, controller=partial(straight, pace=0.5)),
         n_jobs=1,
         progress=False,
     )
     assert (slow["max_speed"] <= 0.5 + 1e-9).all()
-    again = rerun_world(1, worlds=ALONE, controller=straight).metrics()
+    again = RolloutSetup(worlds=ALONE, controller=straight).run(1).metrics()
     assert again["path_length"] == rows["path_length"][1]
     assert rows["unflagged_violations"].sum() == 0
 
@@ -382,7 +391,9 @@ def scene(seed):
 
 
 def test_any_function_of_the_seed_makes_worlds():
-    rows = rollouts(3, worlds=scene, controller=straight, n_jobs=1, progress=False)
+    rows = rollouts(
+        3, RolloutSetup(worlds=scene, controller=straight), n_jobs=1, progress=False
+    )
     assert rows["path_length"].to_numpy() == pytest.approx([1, 2, 3], abs=0.1)
 
 
@@ -390,8 +401,7 @@ def test_stored_chunks_depend_on_the_controller(tmp_path):
     def run(controller):
         rollouts(
             1,
-            worlds=ALONE,
-            controller=controller,
+            RolloutSetup(worlds=ALONE, controller=controller),
             out=tmp_path,
             n_jobs=1,
             progress=False,
@@ -399,7 +409,7 @@ def test_stored_chunks_depend_on_the_controller(tmp_path):
         return sum(path.is_dir() for path in tmp_path.iterdir())
 
     assert run(straight) == run(straight) == 1
-    assert run(None) == 2
+    assert run(make_mpc_cbf) == 2
     assert run(partial(straight, pace=0.5)) == 3
     assert run(partial(straight, pace=0.4)) == run(partial(straight, pace=0.5)) == 4
     with pytest.raises(szlib.SolverError, match="define it in a module"):
@@ -439,7 +449,13 @@ def failing(scenario, settings):
 
 def test_a_failing_controller_is_reported_with_its_world():
     with pytest.raises(KeyError, match="mine") as error:
-        rollouts(1, seed=4, worlds=ALONE, controller=failing, n_jobs=1, progress=False)
+        rollouts(
+            1,
+            RolloutSetup(worlds=ALONE, controller=failing),
+            seed=4,
+            n_jobs=1,
+            progress=False,
+        )
     assert error.value.__notes__ == ["in world 4"]
 
 
@@ -461,6 +477,6 @@ def test_compare_takes_names_and_objects():
     )
     named = rows[["controller", "zone", "formulation", "behaviour"]]
     assert named.to_numpy().tolist() == [["blind", "half", "mine", "slower"]]
-    assert summarise(rows)["controller"].unique().tolist() == ["blind"]
+    assert summarise(rows, metrics=["success"])["controller"].tolist() == ["blind"]
     with pytest.raises(szlib.SolverError, match="unknown names: PID; expected MPC-CBF"):
         compare(1, controllers=["PID"])

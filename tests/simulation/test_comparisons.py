@@ -4,19 +4,16 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
+from studies.literature_zones import ZONES, compare, kirby_curve, measure_time_inside
+from studies.summaries import summarise
 
 import szlib
-from szlib.simulation.comparisons import (
+from szlib.simulation.monte_carlo import (
     BEHAVIOURS,
     FORMULATIONS,
     WORLDS,
-    ZONES,
-    compare,
-    kirby_curve,
-    measure_time_inside,
-    summarise,
+    RolloutSetup,
 )
-from szlib.simulation.monte_carlo import rerun_world
 
 FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
 
@@ -52,7 +49,7 @@ def test_robots_start_outside_each_zone(seed):
 
 
 def test_time_inside_is_measured_with_the_zones_of_the_world():
-    log = rerun_world(0, worlds=WORLDS, zone_transform=ZONES["none"])
+    log = RolloutSetup(worlds=WORLDS, zone_transform=ZONES["none"]).run(0)
     inside = measure_time_inside(log)
     bodies = log.clearance[:, : len(log.scenario.people)]
     assert inside["inside none"] == pytest.approx(0.1 * (bodies.min(axis=1) < 0).sum())
@@ -73,7 +70,7 @@ def test_compare_is_paired():
     with pytest.raises(
         szlib.SolverError, match="unknown names: Hull; expected none, equal circle"
     ):
-        compare(1, zones=("Hull",))
+        szlib.compare(1, zones=("Hull",))
 
 
 def table(**columns):

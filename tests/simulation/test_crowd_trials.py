@@ -11,16 +11,16 @@ import pytest
 from helpers.crowd_models import scene
 from helpers.track_tables import make_tracks, make_walk
 from studies.crowd_trials import CROWDED, measure, violated_by_who_kept
+from studies.replay import ReplacedWalker, find_replays
+from studies.safety_claims import safety_violations
+from studies.social_metrics import compute_replay_metrics
 
 import szlib
 from szlib.control.people import Person
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.crowds.reacting import ReactingPeople
-from szlib.simulation.crowds.walking_model import ModelFactory
-from szlib.simulation.replay import ReplacedWalker, find_replays
-from szlib.simulation.safety_claims import safety_violations
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.crowds import ModelFactory, ReactingPeople
+from szlib.simulation.monte_carlo import RolloutSetup
 from szlib.simulation.scenario import Scenario
-from szlib.simulation.social_metrics import compute_replay_metrics
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 
@@ -54,9 +54,9 @@ def test_claims_hold_for_people_who_keep_their_velocity(
 ) -> None:
     rows = szlib.rollouts(
         3,
-        worlds=CROWDED,
-        behaviour=ReactingPeople(model, sees=sees),
-        measure=measure,
+        RolloutSetup(
+            worlds=CROWDED, behaviour=ReactingPeople(model, sees=sees), measure=measure
+        ),
         n_jobs=1,
         progress=False,
     )
@@ -107,7 +107,9 @@ def test_claims_hold_among_recorded_people_who_keep_their_velocity() -> None:
     for seed in (0, 3, 5):  # claims are void in the last two
         for made in find_replays(crossing(seed), 3, zone=ZONE):
             log = drive(
-                made.scenario, szlib.MPCCBF(ZONE), behaviour=made, until_arrival=False
+                made.scenario,
+                szlib.MPCCBF(ZONE),
+                LoopSettings(behaviour=made, until_arrival=False),
             )
             rows.append(measure(log))
             promised = h_if_they_had_kept_on(log)[log.safe[:-1]]
@@ -159,7 +161,11 @@ def test_false_safety_claims_are_found() -> None:
 def test_the_change_of_motion_is_classified(
     given: tuple, walked: tuple, turned: float, did: str
 ) -> None:
-    log = drive(straight(Person((0.0, 0.0), heading=0.0)), Careless(), max_time=0.1)
+    log = drive(
+        straight(Person((0.0, 0.0), heading=0.0)),
+        Careless(),
+        LoopSettings(max_time=0.1),
+    )
     at = log.states[1, :2] + (0.5, 0.0)
     before = np.array([*(at - 0.1 * np.array(walked)), 0.0, *given])
     people = np.array(
@@ -177,7 +183,9 @@ def test_the_change_of_motion_is_classified(
 def test_intrusions_are_counted_from_geometry() -> None:
     circle = szlib.Ellipse((0.0, 0.0), (1.0, 1.0))
     through = drive(
-        straight(Person((0.0, 0.6), heading=0.0)), Careless(), until_arrival=False
+        straight(Person((0.0, 0.6), heading=0.0)),
+        Careless(),
+        LoopSettings(until_arrival=False),
     )
     seen = compute_replay_metrics(through, circle)
     assert seen["time_intruding"] == pytest.approx(2 * 0.8, abs=0.11), (
@@ -202,7 +210,9 @@ def test_intrusions_are_counted_from_geometry() -> None:
 def test_the_replaced_walker_is_measured_with_their_time_and_path() -> None:
     for made in find_replays(crossing(0), 9, zone=ZONE):
         log = drive(
-            made.scenario, ReplacedWalker(made), behaviour=made, until_arrival=False
+            made.scenario,
+            ReplacedWalker(made),
+            LoopSettings(behaviour=made, until_arrival=False),
         )
         path = made.walker.states[:, :2]
         away = np.hypot(*(path - path[-1]).T)
@@ -216,14 +226,14 @@ def test_replays_are_worlds_and_behaviour_of_rollouts() -> None:
     made = find_replays(crossing(3), 2, zone=ZONE)
     rows = szlib.rollouts(
         len(made),
-        worlds=made,
-        behaviour=made,
-        measure=compute_replay_metrics,
+        RolloutSetup(worlds=made, behaviour=made, measure=compute_replay_metrics),
         n_jobs=1,
         progress=False,
     )
     alone = drive(
-        made[0].scenario, szlib.MPCCBF(ZONE), behaviour=made[0], until_arrival=False
+        made[0].scenario,
+        szlib.MPCCBF(ZONE),
+        LoopSettings(behaviour=made[0], until_arrival=False),
     )
     assert rows.loc[0, list(compute_replay_metrics(alone))].astype(
         float

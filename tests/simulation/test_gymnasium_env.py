@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.simulation.closed_loop import LoopSettings
 
 gymnasium = pytest.importorskip("gymnasium")
 EXAMPLES = Path(__file__).parents[2] / "notebooks" / "examples"
@@ -68,7 +69,7 @@ def test_the_observation_has_the_nearest_people_and_walls_with_their_h(
     log = szlib.simulation.drive(
         scenario,
         szlib.MPCCBF(env.zone, walls=scenario.walls, settings=env.settings),
-        max_time=0.1,
+        LoopSettings(max_time=0.1),
     )
     assert rows[[1, 0, example.PEOPLE], 4] == pytest.approx(log.h[0])
     assert (rows[2 : example.PEOPLE] == example.FAR).all() and (

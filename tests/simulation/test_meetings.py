@@ -8,14 +8,11 @@ import pytest
 
 import szlib
 from szlib.simulation.baseline_controllers import StraightController
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.monte_carlo import identify, rollouts
-from szlib.simulation.scenarios.meetings import (
-    MEETINGS,
-    Variations,
-    VisiblePeople,
-    is_visible,
-)
+from szlib.simulation.catalogue import MEETINGS
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.crowds import VisiblePeople, is_visible
+from szlib.simulation.monte_carlo import RolloutSetup, identify, rollouts
+from szlib.simulation.scenario import Variations
 
 ZONE = szlib.Ellipse((0.05, 0.0), (1.0, 0.7))
 SETTINGS = szlib.MPCSettings()
@@ -57,7 +54,9 @@ def test_people_and_the_robot_start_and_walk_clear_of_walls_and_each_other(name)
 def test_the_controller_arrives_and_its_safety_claims_hold(name):
     scenario = Variations(MEETINGS[name], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
-    metrics = drive(scenario, controller, behaviour=VisiblePeople()).metrics()
+    metrics = drive(
+        scenario, controller, LoopSettings(behaviour=VisiblePeople())
+    ).metrics()
     assert metrics["success"] and metrics["overlaps"] == 0
     assert metrics["unflagged_violations"] == 0
 
@@ -95,9 +94,9 @@ def test_variations_are_worlds_for_rollouts(tmp_path):
         worlds = Variations(MEETINGS[scene], ZONE, **options)
         return rollouts(
             2,
-            worlds=worlds,
-            behaviour=VisiblePeople(),
-            controller=StraightController,
+            RolloutSetup(
+                worlds=worlds, behaviour=VisiblePeople(), controller=StraightController
+            ),
             out=tmp_path,
             n_jobs=1,
             progress=False,
@@ -126,7 +125,7 @@ def test_walls_hide_people_behind_them():
 def test_hidden_people_are_present_but_not_seen():
     scenario = Variations(MEETINGS["blind corner"], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
-    log = drive(scenario, controller, behaviour=VisiblePeople())
+    log = drive(scenario, controller, LoopSettings(behaviour=VisiblePeople()))
     given = ~np.isnan(log.residual[:, 0, 0])
     sight = [
         is_visible(x[:2], p[:2], scenario.walls)

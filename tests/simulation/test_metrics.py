@@ -14,7 +14,7 @@ from szlib.simulation.metrics import (
     find_yielding_steps,
     locate_along_course,
 )
-from szlib.simulation.run import Run
+from szlib.simulation.robot_run import Run
 
 CIRCLE = szlib.Ellipse((0.0, 0.0), (0.7, 0.7))
 SETTINGS = szlib.MPCSettings()

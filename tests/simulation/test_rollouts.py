@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.monte_carlo import rerun_world, rollouts
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
+from szlib.simulation.closed_loop import LoopSettings, drive
+from szlib.simulation.monte_carlo import RolloutSetup, rollouts
+from szlib.simulation.scenario import ONE_PERSON, Worlds
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 # the name of its function, too
@@ -36,7 +36,7 @@ def whole(world):
     return drive(
         world,
         szlib.MPCCBF(ZONE, walls=world.walls, settings=SETTINGS),
-        until_arrival=False,
+        LoopSettings(until_arrival=False),
     )
 
 
@@ -65,16 +65,20 @@ def test_driving_after_the_arrival_does_not_change_earlier_rows():
 
 def test_parallel_and_interrupted_calls_give_the_same_rows(tmp_path, monkeypatch):
     monkeypatch.setattr(MODULE, "CHUNK_SIZE", 2)
-    alone = rollouts(5, worlds=SHORT, n_jobs=1, progress=False)
-    kept = rollouts(3, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
-    more = rollouts(5, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
+    alone = rollouts(5, RolloutSetup(worlds=SHORT), n_jobs=1, progress=False)
+    kept = rollouts(
+        3, RolloutSetup(worlds=SHORT), n_jobs=1, progress=False, out=tmp_path
+    )
+    more = rollouts(
+        5, RolloutSetup(worlds=SHORT), n_jobs=1, progress=False, out=tmp_path
+    )
     pd.testing.assert_frame_equal(alone.drop(columns=TIMES), more.drop(columns=TIMES))
     # solve times too: the finished chunk was read
     pd.testing.assert_frame_equal(kept[:2], more[:2])
     assert {path.name for path in tmp_path.rglob(".szlib-*")} <= {".szlib-lock"}
     other = rollouts(
         2,
-        worlds=SHORT,
+        RolloutSetup(worlds=SHORT),
         settings=szlib.MPCSettings(gamma=0.1),
         n_jobs=1,
         progress=False,
@@ -87,9 +91,9 @@ def test_parallel_and_interrupted_calls_give_the_same_rows(tmp_path, monkeypatch
 def test_rerun_world_gives_exactly_the_row_of_rollouts():
     # of one size: they share one
     alike = Worlds(people=(3, 3), walls=1.0, max_walls=1, duration=3.0)
-    rows = rollouts(3, seed=7, worlds=alike, n_jobs=1, progress=False)
+    rows = rollouts(3, RolloutSetup(worlds=alike), seed=7, n_jobs=1, progress=False)
     again = pd.DataFrame(
-        [rerun_world(seed, worlds=alike).metrics() for seed in rows["seed"]]
+        [RolloutSetup(worlds=alike).run(seed).metrics() for seed in rows["seed"]]
     )
     pd.testing.assert_frame_equal(
         rows.drop(columns=[*TIMES, "seed"]), again.drop(columns=TIMES), check_exact=True
@@ -98,7 +102,10 @@ def test_rerun_world_gives_exactly_the_row_of_rollouts():
 
 def test_columns_are_numbers_and_each_violation_is_flagged():
     table = rollouts(
-        12, worlds=Worlds(people=(3, 5), walls=1.0), n_jobs=1, progress=False
+        12,
+        RolloutSetup(worlds=Worlds(people=(3, 5), walls=1.0)),
+        n_jobs=1,
+        progress=False,
     )
     assert table["seed"].tolist() == list(range(12))
     # walls and people in every world
@@ -144,8 +151,8 @@ def test_the_euclidean_margin_and_the_guard_each_avoid_short_walls():
     careful, guarded, paper = (
         rollouts(
             4,
+            RolloutSetup(worlds=PILLARS),
             seed=4,
-            worlds=PILLARS,
             settings=szlib.MPCSettings(gamma=0.5, N_h=8, margin=margin, guard=guard),
             n_jobs=1,
             progress=False,
@@ -167,7 +174,7 @@ def test_the_euclidean_margin_and_the_guard_each_avoid_short_walls():
 def test_the_whole_barrier_horizon_is_safe_around_one_person():
     table = rollouts(
         10,
-        worlds=ONE_PERSON,
+        RolloutSetup(worlds=ONE_PERSON),
         settings=szlib.MPCSettings(N_h=8),
         n_jobs=1,
         progress=False,
@@ -185,7 +192,7 @@ def test_a_failing_world_is_named_by_its_seed():
         szlib.SolverError,
         match="the controller failed in world 5: a zone must lie within",
     ):
-        rerun_world(5, worlds=Worlds(standing=1.0), zone_transform=huge)
+        RolloutSetup(worlds=Worlds(standing=1.0), zone_transform=huge).run(5)
 
 
 def huge(zone):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.simulation.run import Run
+from szlib.simulation.robot_run import Run
 
 CIRCLE = szlib.Ellipse((0.0, 0.0), (0.7, 0.7))
 SETTINGS = szlib.MPCSettings()

@@ -338,7 +338,7 @@ def test_a_log_with_an_obstacle_of_an_unknown_kind_is_rejected(tmp_path):
 def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
     log = logs[name]
     log.save(tmp_path / "run.json")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json", "run.parquet"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json", "run.npz"]
     back = szlib.SimulationLog.load(tmp_path / "run")
     pd.testing.assert_frame_equal(back.table, log.table, check_exact=True)
     assert back.metrics() == log.metrics()
@@ -371,7 +371,8 @@ def test_a_log_without_people_is_saved_and_loaded(tmp_path):
     ("change", "message"),
     [
         (lambda folder: (folder / "run.json").unlink(), "FileNotFoundError"),
-        (lambda folder: (folder / "run.parquet").write_bytes(b"PAR1"), "Arrow|Parquet"),
+        (lambda folder: (folder / "run.npz").write_bytes(b"PK\x03\x04"), "BadZipFile"),
+        (lambda folder: (folder / "run.npz").write_bytes(b"[]"), "ValueError"),
         (
             lambda folder: (folder / "run.json").write_text(
                 '{"format": "other", "version": 1}'

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
+from studies import social_metrics
+from studies.social_metrics import compute_replay_metrics, compute_social_metrics
 
 import szlib
-from szlib.simulation import social_metrics
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.social_metrics import (
-    compute_replay_metrics,
-    compute_social_metrics,
-)
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from studies.distances import euclidean_to_segment
 
 import szlib
-from szlib.simulation.scenario import Behaviour
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
+from szlib.simulation.crowds import Behaviour
+from szlib.simulation.scenario import ONE_PERSON, Worlds
 
 seeds = st.integers(0, 2**32)
 

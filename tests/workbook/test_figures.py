@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
+from studies.safety_claims import MOTION_CHANGES
 
 import szlib
-from szlib.simulation.safety_claims import MOTION_CHANGES
 from szlib.workbook import figures
 
 matplotlib.use("Agg")

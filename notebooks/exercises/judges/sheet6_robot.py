@@ -11,9 +11,9 @@ import numpy as np
 from szlib.checks import Array
 from szlib.control.mpc import MPCCBF
 from szlib.control.settings import MPCSettings
+from szlib.simulation.catalogue import SCENARIOS
 from szlib.simulation.closed_loop import simulate
 from szlib.simulation.metrics import find_avoidance_start
-from szlib.simulation.scenarios.paper import SCENARIOS
 from szlib.zones.ellipses import Ellipse
 
 from .task import Args, Rng, make_task, repeat

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from ...simulation.safety_claims import MOTION_CHANGES
 from ...zones.pooling import POSITIVE, UNITS, Pooled
 from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from .style import add_legend_below, add_shared_legend, get_axes
@@ -371,20 +370,19 @@ def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     table : one row for each crowd, its name in the index: `claimed_safe_steps`, and the number of violations
-        of each kind in `szlib.simulation.MOTION_CHANGES`.
+        after each kind of motion, one column each.
     ax : axes to draw on; None makes new ones.
 
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.simulation.safety_claims import MOTION_CHANGES
     >>> from szlib.workbook import figures
-    >>> table = pd.DataFrame(1, index=["ETH"], columns=[*MOTION_CHANGES, "claimed_safe_steps"])
+    >>> table = pd.DataFrame(1, index=["ETH"], columns=["came", "turned", "claimed_safe_steps"])
     >>> ax = figures.plot_safety_claims(table)
     """
     ax = get_axes(ax, size=(8, 3.5))
     left = np.zeros(len(table))
-    for kind in MOTION_CHANGES:
+    for kind in table.columns.drop("claimed_safe_steps"):
         share = (
             1000
             * table[kind].to_numpy(float)

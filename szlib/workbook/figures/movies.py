@@ -17,8 +17,7 @@ import numpy as np
 
 from ...checks import Array
 from ...control.settings import MPCSettings
-from ...simulation.run import Run
-from ...simulation.scenario import Scenario
+from ...simulation import Run, Scenario
 from ...zones.ellipses import Ellipse
 from .control import outline_obstacle
 from .palette import BLUE, GREEN, RED

@@ -19,9 +19,8 @@ from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
 from ...checks import Array
-from ...simulation.replay import Replay
-from ...simulation.run import Run, nanmin
-from ...simulation.scenario import Scenario
+from ...simulation import Run, Scenario
+from ...simulation.robot_run import nanmin
 from ...zones.ellipses import Ellipse
 from .control import draw_obstacle
 from .movies import Movie, place_zones
@@ -194,7 +193,7 @@ def plot_robot_paths(runs: Mapping[str, Run], *, ax: Axes | None = None) -> Axes
 
 
 def plot_crowd(
-    run: Run, *, replay: Replay | None = None, ax: Axes | None = None
+    run: Run, *, walked: Array | None = None, ax: Axes | None = None
 ) -> Axes:
     """Plot the paths of the robot and of all people, with a dot each second.
 
@@ -203,7 +202,7 @@ def plot_crowd(
     Parameters
     ----------
     run : the run.
-    replay : the replay of the run; it gives the path of the person whom the robot replaces.
+    walked : path of the person whom the robot replaces, shape (n, 2) [m].
     ax : axes to draw on; None makes new ones.
 
     Examples
@@ -226,9 +225,9 @@ def plot_crowd(
             x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None
         )
         ax.plot(x[::second], y[::second], ".", color=RED, markersize=3, alpha=0.5)
-    if replay is not None:
+    if walked is not None:
         ax.plot(
-            *replay.walker.states[:, :2].T,
+            *walked.T,
             "--",
             color=GREEN,
             linewidth=2,

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import Array
-from ..control.obstacles import barrier, ellipse_distance
-from ..control.settings import TOLERANCE
-from ..encounters.geometry import wrap_angle
-from .run import Run
+from szlib.checks import Array
+from szlib.control.obstacles import barrier, ellipse_distance
+from szlib.control.settings import TOLERANCE
+from szlib.encounters.geometry import wrap_angle
+from szlib.simulation.robot_run import Run
 
 # A person within this distance of the expected position keeps their velocity [m]; the same for the heading
 # [rad].
@@ -53,9 +53,7 @@ def safety_violations(run: Run) -> pd.DataFrame:
             rows.append((t, i, h, np.nan, np.nan, "came", True))
             continue
         expected = before[:2] + dt * before[3:]
-        zone = run.zones[i].placed(
-            (float(expected[0]), float(expected[1])), float(before[2])
-        )
+        zone = run.zones[i].placed((float(expected[0]), float(expected[1])), float(before[2]))
         distance = float(ellipse_distance(run.states[k + 1, :2], zone))
         h_claimed = barrier(distance, run.settings.r_robot, run.settings.eps)
         deviation = float(np.hypot(*(after[:2] - expected)))

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Array
-from ..control.obstacles import ellipse_distance
-from ..encounters.geometry import wrap_angle
-from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .metrics import measure_path_length
-from .run import Run, nanmin
-from .scenario import STOPPED_SPEED
+from szlib.checks import Array
+from szlib.control.obstacles import ellipse_distance
+from szlib.encounters.geometry import wrap_angle
+from szlib.simulation.metrics import measure_path_length
+from szlib.simulation.robot_run import Run, nanmin
+from szlib.simulation.scenario import STOPPED_SPEED
+from szlib.zones.ellipses import BODY_RADIUS, Ellipse
 
 # Range of each of Hall's distances [m].
 HALL_DISTANCES = {
@@ -60,9 +60,7 @@ def compute_social_metrics(run: Run) -> dict[str, float]:
     }
     return {
         "heading_changes": _sum_heading_changes(states),
-        "closest_person": float(nearest[is_near_person].mean())
-        if is_near_person.any()
-        else np.nan,
+        "closest_person": float(nearest[is_near_person].mean()) if is_near_person.any() else np.nan,
         **fractions,
         "robot_on_person": robot_on_person,
         "person_on_robot": person_on_robot,
@@ -100,9 +98,7 @@ def _count_collisions(run: Run, way: slice, gap: Array) -> tuple[int, int]:
     offset = run.states[way, None, :2] - run.people[way, :, :2]
     robot = -(run.states[way, None, 2:] * offset).sum(axis=2)
     person = (run.people[way, :, 3:] * offset).sum(axis=2)
-    return int((begins & (robot >= person)).sum()), int(
-        (begins & (robot < person)).sum()
-    )
+    return int((begins & (robot >= person)).sum()), int((begins & (robot < person)).sum())
 
 
 def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, float]:
@@ -110,7 +106,7 @@ def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, f
 
     Parameters
     ----------
-    run : the run of the robot, or of the person (`szlib.simulation.ReplacedWalker`).
+    run : the run of the robot, or of the person (`studies.replay.ReplacedWalker`).
     zone : the fitted zone, in each person's own frame; None: the zones of the run. It is learned from
         distances between centres, so that a robot and a person are measured alike.
 
@@ -123,9 +119,7 @@ def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, f
     time_intruding : time in any zone [s].
     nearest : smallest distance from the robot's centre to a person's [m]; NaN without people.
     """
-    rows = np.flatnonzero(
-        np.hypot(*(run.states[:, :2] - run.scenario.goal).T) <= REACHED
-    )
+    rows = np.flatnonzero(np.hypot(*(run.states[:, :2] - run.scenario.goal).T) <= REACHED)
     way = slice(None, int(rows[0]) + 1 if len(rows) else None)
     path, n_people = run.states[way, :2], len(run.zones)
     length, straight = measure_path_length(path), float(np.hypot(*(path[-1] - path[0])))
@@ -140,7 +134,5 @@ def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, f
         "path_efficiency": straight / length if reached and length > 0 else np.nan,
         "intrusions": float(_find_onsets(inside).sum()),
         "time_intruding": run.settings.dt * float(inside.any(axis=1).sum()),
-        "nearest": float(np.nanmin(distance))
-        if np.isfinite(distance).any()
-        else np.nan,
+        "nearest": float(np.nanmin(distance)) if np.isfinite(distance).any() else np.nan,
     }

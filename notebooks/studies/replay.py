@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import Array
-from ..control.controller import Controller
-from ..control.people import Person
-from ..control.settings import MPCSettings
-from ..encounters.areas import area_for
-from ..encounters.geometry import Area
-from ..errors import DataError
-from ..tracks.clock import TICKS_PER_SECOND, clock_index
-from ..zones.ellipses import Ellipse
-from .crowds.reacting import MIN_HEADING_SPEED
-from .scenario import Crowd, CrowdModel, Scenario
+from szlib.checks import Array
+from szlib.control.controller import Controller
+from szlib.control.people import Person
+from szlib.control.settings import MPCSettings
+from szlib.encounters.areas import area_for
+from szlib.encounters.geometry import Area
+from szlib.errors import DataError
+from szlib.simulation.crowds import MIN_HEADING_SPEED, Crowd, CrowdModel
+from szlib.simulation.scenario import Scenario
+from szlib.tracks.clock import TICKS_PER_SECOND, clock_index
+from szlib.zones.ellipses import Ellipse
 
 TIME_FACTOR = 2.0
 """Time limit of the robot, as a multiple of the walker's time, or of its own time at full speed (assumed)."""
@@ -90,10 +90,7 @@ class Replay(CrowdModel):
         x, y = robot[:2].tolist()
         people = (other.at(t, self.zone) for other in self.others)
         return tuple(
-            p
-            if p and hypot(p.position[0] - x, p.position[1] - y) <= SENSING_RANGE
-            else None
-            for p in people
+            p if p and hypot(p.position[0] - x, p.position[1] - y) <= SENSING_RANGE else None for p in people
         )
 
 
@@ -112,9 +109,7 @@ class Replays(tuple[Replay, ...]):
         """The people of the replay of a `seed`, whatever the `scenario`."""
         return self[seed % len(self)].start(scenario, seed)
 
-    def observe(
-        self, people: tuple[Person, ...], rng: np.random.Generator
-    ) -> tuple[Person, ...]:
+    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
         """The `people` themselves; nothing is drawn from `rng`."""
         return people
 
@@ -133,9 +128,7 @@ class ReplacedWalker(Controller):
         self.settings, self.robot = settings or MPCSettings(), self
         self._path = replay.walker.states[:, :4]
 
-    def step(
-        self, state: Array, goal: Array, people: Sequence[Person]
-    ) -> ReplacedWalker:
+    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> ReplacedWalker:
         """No control is needed, whatever the `state`, `goal` and `people`."""
         return self
 
@@ -146,12 +139,7 @@ class ReplacedWalker(Controller):
     def body(self, own: Array) -> Array:
         """(x, y, vx, vy) at the time `own`; at the end of the path the walker stays there."""
         tick = min(float(own[0]) * TICKS_PER_SECOND, len(self._path) - 1.0)
-        return np.array(
-            [
-                np.interp(tick, np.arange(len(self._path)), column)
-                for column in self._path.T
-            ]
-        )
+        return np.array([np.interp(tick, np.arange(len(self._path)), column) for column in self._path.T])
 
     def advance(self, own: Array, control: Array, dt: float) -> Array:
         """The time `own`, `dt` later; there is no `control`."""
@@ -212,18 +200,12 @@ def find_replays(
             1,
         )
         t1 = t0 + round(duration * TICKS_PER_SECOND)
-        is_other = (pieces["day"] == pieces["day"].iloc[number]) & (
-            pieces["id"] != ids[begin]
-        )
+        is_other = (pieces["day"] == pieces["day"].iloc[number]) & (pieces["id"] != ids[begin])
         is_other &= (pieces["last"] >= t0) & (pieces["first"] <= t1)
-        others = tuple(
-            _cut(states, each, t0, t1) for each in pieces[is_other].itertuples()
-        )
+        others = tuple(_cut(states, each, t0, t1) for each in pieces[is_other].itertuples())
         walker = RecordedPerson(int(ids[begin]), 0, _add_heading(states[begin:end]))
         if _has_free_start(walker, others):
-            replays.append(
-                Replay(_make_scenario(walker, duration, s), walker, others, zone)
-            )
+            replays.append(Replay(_make_scenario(walker, duration, s), walker, others, zone))
         if len(replays) == n:
             break
     if not replays:
@@ -242,18 +224,14 @@ def _cut(states: Array, piece: Any, t0: int, t1: int) -> RecordedPerson:
     return RecordedPerson(int(piece.id), int(max(piece.first - t0, 0)), whole[rows])
 
 
-def _find_paths(
-    states: Array, pieces: pd.DataFrame, area: Area | None
-) -> list[tuple[int, int, int]]:
+def _find_paths(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[int, int, int]]:
     """Number of the piece, first row and end of each path that is long enough."""
     inside = np.ones(len(states), bool)
     if area is not None:
         inside = np.asarray(area.contains(states[:, 0], states[:, 1]))
     paths = []
     for number, (a, b) in enumerate(pieces[["begin", "end"]].itertuples(index=False)):
-        edges = (
-            np.flatnonzero(np.diff(np.r_[False, inside[a:b], False])).reshape(-1, 2) + a
-        )
+        edges = np.flatnonzero(np.diff(np.r_[False, inside[a:b], False])).reshape(-1, 2) + a
         for begin, end in edges.tolist():
             if hypot(*(states[end - 1, :2] - states[begin, :2])) >= MIN_TRAVEL:
                 paths.append((number, begin, end))
@@ -263,10 +241,7 @@ def _find_paths(
 def _has_free_start(walker: RecordedPerson, others: Sequence[RecordedPerson]) -> bool:
     """True if no person is within `MIN_START_DISTANCE` of the walker's start."""
     present = [person for other in others if (person := other.at(0.0)) is not None]
-    return all(
-        np.hypot(*(walker.states[0, :2] - p.position)) > MIN_START_DISTANCE
-        for p in present
-    )
+    return all(np.hypot(*(walker.states[0, :2] - p.position)) > MIN_START_DISTANCE for p in present)
 
 
 def _make_scenario(walker: RecordedPerson, duration: float, s: MPCSettings) -> Scenario:

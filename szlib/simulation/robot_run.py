@@ -13,11 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Array
-from ..control.obstacles import Obstacles, barrier, ellipse_distance
-from ..control.people import Person
-from ..control.settings import MPCSettings
-from ..errors import DataError
+from ..checks import Array, require
+from ..control import MPCSettings, Obstacles, Person, barrier, ellipse_distance
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
 
@@ -102,9 +99,10 @@ class Run:
     def relative(self) -> Array:
         """Position of the robot in each person's frame, shape (n, P, 2) [m]."""
         offset = self.states[:, None, :2] - self.people[:, :, :2]
-        cos, sin = np.cos(self.people[:, :, 2]), np.sin(self.people[:, :, 2])
-        ahead = offset[..., 0] * cos + offset[..., 1] * sin
-        return np.stack([ahead, offset[..., 1] * cos - offset[..., 0] * sin], axis=-1)
+        x, y = np.moveaxis(offset, -1, 0)
+        cos = np.cos(self.people[:, :, 2])
+        sin = np.sin(self.people[:, :, 2])
+        return np.stack([x * cos + y * sin, y * cos - x * sin], axis=-1)
 
     @cached_property
     def is_present(self) -> NDArray[np.bool_]:
@@ -131,18 +129,16 @@ class Run:
     @cached_property
     def h(self) -> Array:
         """Barriers with the true positions of people, shape (n, P+W) [m]."""
-        s, (x, y, *_) = self.settings, self.states.T
         distances = self.distances_to_zones(self.zones, ellipse_distance)
-        to_people = barrier(distances, s.r_robot, s.eps)
-        return np.hstack([to_people, self.fixed.h(x, y).T])
+        to_people = barrier(distances, self.settings.r_robot, self.settings.eps)
+        return np.hstack([to_people, self.fixed.h(*self.states[:, :2].T).T])
 
     @cached_property
     def clearance(self) -> Array:
         """Euclidean gaps from the disc to bodies (of `BODY_RADIUS`) and obstacles, shape (n, P+W) [m]."""
         away = np.hypot(self.relative[..., 0], self.relative[..., 1])
         to_people = away - BODY_RADIUS - self.settings.r_robot
-        x, y, *_ = self.states.T
-        return np.hstack([to_people, self.fixed.gaps(x, y).T])
+        return np.hstack([to_people, self.fixed.gaps(*self.states[:, :2].T).T])
 
     @cached_property
     def cbf_people(self) -> Array:
@@ -159,15 +155,10 @@ class Run:
         DataError : the run has no such time.
         """
         row = round(time / self.settings.dt)
-        if not 0 <= row < len(self.states):
-            raise DataError(
-                f"the run has times from 0 to {self.time[-1]:g} s; got {time:g}"
-            )
-        present = [
-            Person((x, y), (vx, vy), heading, zone)
-            for zone, (x, y, heading, vx, vy) in zip(
-                self.zones, self.people[row].tolist(), strict=True
-            )
-            if x == x
-        ]
+        expected = f"a time of the run, from 0 to {self.time[-1]:g} s"
+        require(0 <= row < len(self.states), "time", time, expected)
+        present = list[Person]()
+        for i in np.flatnonzero(self.is_present[row]):
+            x, y, heading, vx, vy = self.people[row, i].tolist()
+            present.append(Person((x, y), (vx, vy), heading, self.zones[i]))
         return self.states[row], self.scenario.goal, present
