@@ -60,7 +60,7 @@ from szlib.simulation.strategies import classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 
-record = NotebookRecord("11_waiting", globals())
+record = NotebookRecord("11_waiting", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario_runs.list_parameters(
     settings,

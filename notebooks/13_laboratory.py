@@ -43,7 +43,7 @@ import szlib
 from szlib.workbook import figures
 from szlib.workbook.record import NotebookRecord
 
-record = NotebookRecord("13_laboratory", globals())
+record = NotebookRecord("13_laboratory", globals(), plaza_zone=True)
 
 # %% jupyter={"source_hidden": true}
 # The zone of notebook 05
