@@ -21,7 +21,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [06](06_respect.ipynb) · next: [8 - Build the controller
-# yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 1-7 · 35
+# yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 1-7 · 50
 # min · needs [05](05_zones.ipynb) · exercises:
 # [5.1-5.5](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)),
 # [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) · laboratory: [13](13_laboratory.ipynb)
@@ -52,7 +52,7 @@ from szlib.control import HalfPlane, barrier, cbf_residual
 from szlib.workbook import figures
 from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters
 
-record = NotebookRecord("07_barriers", globals())
+record = NotebookRecord("07_barriers", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, zone_speed=zone_speed)
 zone = record.cache.ellipse()
 parameters(
@@ -286,6 +286,137 @@ Markdown(
     f"second step: with gamma = 0.1, which the rule allows, and $N_h = 1$, {gentle[0]} steps have no solution, with $N_h = 2$ {gentle[1]}. The "
     "paper takes $N_h = 2$. Notebook 21 shows where that is not enough.\n\n</details>"
 )
+
+# %% [markdown]
+# ## Theory: the same in continuous time
+#
+# **Lie derivatives.** A robot $\dot{\mathbf x} = f(\mathbf x) + g(\mathbf x)\,u$ changes $h$ at the rate
+#
+# $$\dot h = L_f h + L_g h\, u, \qquad L_f h = \nabla h^\top f, \quad L_g h = \nabla h^\top g .$$
+#
+# $L_f h$ is what happens without an input, $L_g h$ what the input can do. A *control barrier function* (Ames et al., 2019)
+# has an input with $L_f h + L_g h\,u \ge -\alpha h$ in each state. The robot that chooses its speed has $L_g h = -1$.
+# The robot that chooses its acceleration has $f = (v, 0)$ and $g = (0, 1)$:
+
+
+# %%
+def lie(h, field, state, e=1e-4):
+    step = e * np.array(field(state))
+    return (h(state + step) - h(state - step)) / (2 * e)
+
+
+def gap(state):
+    return 3.0 - state[0]  # h of a robot at x, before a zone that begins at 3 m
+
+
+def drift(state):
+    return state[1], 0.0
+
+
+def push(state):
+    return 0.0, 1.0
+
+
+moving = np.array([1.0, 0.8])
+first, second = lie(gap, push, moving), lie(lambda s: lie(gap, drift, s), push, moving)
+print(f"L_f h = {lie(gap, drift, moving):.1f} m/s, L_g h = {first:.0f}, L_g L_f h = {second:.0f}")
+
+# %% [markdown]
+# $L_g h = 0$: no acceleration changes $\dot h$. It appears in $\ddot h$, with $L_g L_f h = -1$. The number of derivatives until
+# the input appears is the **relative degree**, here 2.
+#
+# **Exercise.** A robot with two wheels chooses its speed and its rate of turning. Which relative degree has $h$ for each?
+# <details><summary>Answer</summary>1 for the speed, since the speed moves the robot at once; except where it drives along the
+# edge of the zone: there $L_g h = 0$. 2 for the rate of turning, which changes the heading, and the heading changes
+# where the speed leads.</details>
+#
+# **Higher order.** Take the condition twice (Nguyen & Sreenath, 2016: *exponential* CBF; Xiao & Belta, 2022: *high-order* CBF):
+#
+# $$\psi_1 = \dot h + \alpha_1 h, \qquad \dot\psi_1 + \alpha_2 \psi_1 \ge 0
+#   \quad\Longleftrightarrow\quad \ddot h + (\alpha_1 + \alpha_2)\,\dot h + \alpha_1 \alpha_2\, h \ge 0 .$$
+#
+# For the straight approach, $\dot h = -v$ and $\ddot h = -a$, so $a \le \alpha_1\alpha_2 h - (\alpha_1+\alpha_2)\,v$. How hard does
+# the robot brake?
+
+
+# %%
+def brake_by_order_two(rate, h=10.0, v=1.0, dt=0.001):
+    """Least h and the hardest braking of a robot that keeps its speed until the condition limits it."""
+    least, hardest = h, 0.0
+    for _ in range(round(20 / dt)):
+        a = min(0.0, rate**2 * h - 2 * rate * v)
+        h, v = h - v * dt, v + a * dt
+        least, hardest = min(least, h), max(hardest, -a)
+    return least, hardest
+
+
+by_rate = {rate: brake_by_order_two(rate) for rate in (0.5, 1.0, 2.0)}
+for rate, (low, hard) in by_rate.items():
+    print(f"both rates {rate:g} /s: brakes with at most {hard:.2f} m/s², least h {low:.2f} m")
+
+# %% [markdown]
+# With both rates $\alpha$ a robot at $v$ brakes with up to $\alpha v / e \approx 0.37\,\alpha v$: so $\alpha$ is limited by $a_{max}/v_{max}$, as
+# gamma is by $a_{max}\Delta t / v_{max}$ above.
+#
+# **Proof 1, on paper.** Let $h(0) \ge 0$, $\psi_1(0) \ge 0$ and $\dot\psi_1 + \alpha_2\psi_1 \ge 0$ at all times. Show that $h(t) \ge 0$ at all
+# times. Why is $\psi_1(0) \ge 0$ needed? Give a start with $h(0) > 0$ for which no controller helps.
+# <details><summary>Model solution</summary>Multiply by $e^{\alpha_2 t} > 0$: $\frac{d}{dt}\big(e^{\alpha_2 t}\psi_1\big) = e^{\alpha_2
+# t}(\dot\psi_1 + \alpha_2\psi_1) \ge 0$, so $e^{\alpha_2 t}\psi_1(t) \ge \psi_1(0) \ge 0$, and $\psi_1(t) \ge 0$. That says $\dot h + \alpha_1 h \ge 0$.
+# The same step with $e^{\alpha_1 t}$ gives $e^{\alpha_1 t}h(t) \ge h(0) \ge 0$. Without $\psi_1(0) \ge 0$ the first step fails: $\psi_1$ may be
+# negative for a time, and $h$ falls faster than at the rate $\alpha_1$. A start: $h = 0.2$ m with $v = 1$ m/s and $a_{max}$ = 1 m/s².
+# It needs 0.5 m to stop. So the safe set is $\{h \ge 0, \psi_1 \ge 0\}$, not $\{h \ge 0\}$.</details>
+#
+# **What does the discrete condition do about it?** In discrete time an acceleration does appear in the next $h$, but with a
+# small gain: after $n$ steps it has moved the robot by $(n - \tfrac12)\,\Delta t^2 a$.
+
+# %%
+for dt in (0.1, 0.05):
+    gains = ", ".join(f"{1000 * (n - 0.5) * dt**2:.2f} mm after {n}" for n in (1, 2, 8))
+    print(f"dt = {dt:g} s: 1 m/s² in the first step moves the robot by {gains} steps")
+
+# %% [markdown]
+# The row of the second step is $h_{k+2} \ge (1-\gamma)\,h_{k+1}$. Its first acceleration acts on the *speed* in that step: it
+# says $v_{k+1} \lesssim \gamma h_{k+1}/\Delta t$, which is $\psi_1 \ge 0$ with $\alpha_1 = \gamma/\Delta t$. So $N_h = 2$ does for a relative degree of 2 what
+# $\psi_1$ does in continuous time, and more steps do it earlier, with a limit of $a$ in mind.
+#
+# **Exercise.** You halve $\Delta t$ and keep $N_h$. Does the robot look as far ahead?
+# <details><summary>Answer</summary>No: $N_h\,\Delta t$ is halved, and so is what it can do about a speed in that time; the gain of one
+# step even falls to a quarter. Double $N_h$, and halve gamma.</details>
+#
+# **A wrong velocity.** The condition trusts the velocity of the person. Let the person come faster by $\delta$ than the robot
+# assumes. Then $h_{k+1} \ge (1-\gamma)\,h_k - \delta\,\Delta t$. What happens to $h$?
+
+
+# %%
+def approach_blindly(error, gamma, h=2.0, dt=0.1):
+    """h after 60 s of a robot that assumes a person who stands, while the person comes with `error` m/s."""
+    for _ in range(600):
+        h = h - (allowed_speed(h, gamma, dt) + error) * dt
+    return h
+
+
+lags = {(error, share): approach_blindly(error, share) for error in (0.05, 0.1) for share in (0.05, 0.1)}
+for (error, share), low in lags.items():
+    print(f"{error:g} m/s too fast, gamma = {share:g}: h ends at {100 * low:+.0f} cm")
+
+# %% [markdown]
+# It ends at $-\delta\,\Delta t/\gamma$, and goes no lower: the set $\{h \ge -\delta\,\Delta t/\gamma\}$ is invariant. (This is *input-to-state
+# safety*, Kolathaya & Ames, 2019.) A *smaller* gamma makes it worse here: such a robot corrects an error more slowly.
+#
+# **Exercise.** The margin $\epsilon$ is 5 cm. For which $\delta$ is that enough, with the paper's gamma?
+# <details><summary>Answer</summary>$\delta = \epsilon\gamma/\Delta t$: 2.5 cm/s with gamma = 0.05. Speeds of people are measured with larger errors. So
+# the margin is no answer to wrong velocities; measuring again ten times a second is, and a zone that is larger than a body.</details>
+
+# %% jupyter={"source_hidden": true}
+# Checks
+what = "the condition of order two keeps h positive"
+record.check(what, min(low for low, _ in by_rate.values()) > 0, f"rates {list(by_rate)}", always=True)
+peak = {rate: hard / rate for rate, (_, hard) in by_rate.items()}
+alike = max(abs(each - np.exp(-1)) for each in peak.values())
+record.check("the robot brakes with alpha v / e", alike < 0.01, f"{peak[1.0]:.3f}", always=True)
+record.check("relative degree 2: L_g h = 0, L_g L_f h = -1", abs(first) + abs(second + 1) < 1e-6, always=True)
+off = max(abs(low + error * 0.1 / share) for (error, share), low in lags.items())
+record.check("a wrong velocity ends at h = -delta dt / gamma", off < 1e-6, f"{off:.0e} m off", always=True)
 
 # %% [markdown]
 # ## Distance to a person's zone

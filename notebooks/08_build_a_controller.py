@@ -21,14 +21,15 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [07](07_barriers.ipynb) · next: [9 - Passing a person who
-# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 35 min ·
+# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 40 min ·
 # needs [07](07_barriers.ipynb) · exercises:
 # [7.1-7.8](exercises/sheet7_controller.ipynb#7.1-A-filter-on-a-road-(15-min)) · laboratory:
 # [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for. **Words.**
 # *IPOPT*: the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive control: plan
-# some steps ahead, take the first, plan again; *slack*: by how much a row is violated; *SQP*: sequential
+# some steps ahead, take the first, plan again; *priority*: what a plan obeys first if it cannot obey all:
+# walls, then bodies, then zones, then decay; *slack*: by how much a row is violated; *SQP*: sequential
 # quadratic programming: solve quadratic problems in a row, each around the last answer.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
@@ -57,7 +58,7 @@ import szlib
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
 
-record = NotebookRecord("08_build_a_controller", globals())
+record = NotebookRecord("08_build_a_controller", globals(), plaza_zone=True)
 zone = record.cache.ellipse()
 same = {"gamma": gamma, "N": N, "N_h": N_h, "a_max": a_max}
 paper = szlib.MPCSettings.paper(**same)
@@ -451,6 +452,91 @@ record.key["largest difference of an acceleration [m/s²]"] = float(table.to_num
 #
 # **A plan need not exist** (chapter 07). Your robot then goes on with its last plan. The library solves again with a
 # penalised *slack*, and flags the step (notebook 21).
+
+# %% [markdown]
+# **A wish and a duty.** A *control Lyapunov function* $V$ is for goals what $h$ is for people: $V$ is 0 at the goal, positive
+# elsewhere, and some input makes it fall, $\dot V \le -c\,V$. A *CLF-CBF-QP* (Ames et al., 2017) takes both, and lets the
+# goal give way, by $\delta$:
+#
+# $$\min_{v,\,\delta}\ v^2 + p\,\delta^2 \quad\text{subject to}\quad \dot V \le -c\,V + \delta, \qquad \dot h \ge -\alpha\,h .$$
+#
+# The robot is $e = 2$ m away from its goal, $V = e^2$, and a zone begins $h$ in front of it. With $c = 1$/s and $\alpha = 0.5$/s:
+
+
+# %%
+def choose_speed(e, h, c=1.0, alpha=0.5, price=10.0):
+    """The speed of the CLF-CBF-QP on a road, and by how much the goal gives way."""
+    v = price * 2 * e * c * e**2 / (1 + price * (2 * e) ** 2)  # the best one without the barrier
+    v = min(v, alpha * h)
+    return v, max(0.0, c * e**2 - 2 * e * v)
+
+
+for room in (4.0, 0.5, 0.0):
+    print(
+        "h = {:g} m: v = {:.2f} m/s, the goal gives way by {:.2f} m²/s".format(room, *choose_speed(2.0, room))
+    )
+
+# %% [markdown]
+# **Exercise.** A person stands exactly between the robot and its goal. Where does this robot end, in the plane as well?
+# <details><summary>Answer</summary>At $h = 0$, in front of the person: $V$ could fall only through the zone, and no one-step condition
+# looks around it. Such a stop is an *undesired equilibrium* of the CLF-CBF-QP (Reis et al., 2021). A plan that reaches
+# past the person has a way around, which costs less than to stand.</details>
+#
+# **Recursive feasibility.** If there is a plan now, is there one in the next step? Let the whole plan obey the rows ($N_h = N$)
+# and end *at rest*, $\mathbf v_N = 0$, among people who stand. Then yes. How long must such a plan be?
+
+# %%
+for brake in (1.0, 0.5):
+    print(
+        f"from {v_max:g} m/s with {brake:g} m/s²: at least {np.ceil(v_max / brake / dt):.0f} steps to stand"
+    )
+
+# %% [markdown]
+# So the paper's $N = 8$ cannot end at rest at 1 m/s: it has no such guarantee (notebook 21 counts what that costs).
+#
+# **Proof 2, on paper.** Show: if the plan $(\mathbf u_0, \dots, \mathbf u_{N-1})$ obeys all limits and rows, and ends at rest, then
+# so does $(\mathbf u_1, \dots, \mathbf u_{N-1}, \mathbf 0)$ one step later. Where do you need that people stand, that $h \ge 0$, and that $\gamma \le 1$?
+# <details><summary>Model solution</summary>The first step of the old plan is driven, so the new plan passes through the old states
+# $\mathbf x_1, \dots, \mathbf x_N$, with old inputs: their limits of speed and acceleration hold. People stand, so $h$ of each of these places is
+# what it was, and the rows between them hold. One step is new: $\mathbf u = \mathbf 0$ from $\mathbf x_N$, where $\mathbf v_N = 0$. The robot stays,
+# $\mathbf x_{N+1} = \mathbf x_N$, at rest again. Its row is $h(\mathbf x_{N+1}) = h(\mathbf x_N) \ge (1 - \gamma)\,h(\mathbf x_N)$, which holds for $h \ge 0$
+# and $0 \le \gamma \le 1$; and $h(\mathbf x_N) \ge (1-\gamma)^N h(\mathbf x_0) \ge 0$ follows from the rows. If people walk, $h(\mathbf x_N)$ changes while the
+# robot stands, and the last step fails.</details>
+#
+# **Prices or priorities.** A row that gives way by $s \ge 0$ costs $p\,s$. Is $s = 0$ wherever $s = 0$ is possible? A robot that would
+# like 1 m/s, $\min (v - 1)^2 + p\,s$, has the limit $v \le 0.25 + s$:
+
+
+# %%
+def violate(price, wish=1.0, limit=0.25):
+    v = max(limit, min(wish, wish - price / 2))  # where the slope of the cost is the price
+    return v - min(v, limit)
+
+
+for price in (0.5, 1.4, 1.6):
+    print(f"price {price:g}: the row gives way by {violate(price):.2f} m/s")
+
+# %% [markdown]
+# From $p = 2\,(1 - 0.25) = 1.5$ on it does not give way. This is the multiplier of the row, its *price* above. A penalty $p\,s$
+# with a larger $p$ is **exact**; $p\,s^2$ never is. But multipliers differ from step to step, so a fixed $p$ is too small some
+# time, and a huge one spoils the numbers. The library therefore has **priorities**: it first makes the violation of walls as small as
+# possible, then that of bodies, then of zones, and only then the cost.
+#
+# **Exercise.** Why is $p\,s^2$ never exact?
+# <details><summary>Answer</summary>At $s = 0$ its slope is 0: to give way a little is free, but it gains at the rate of the
+# multiplier. So it gives way by about multiplier / 2p, however large $p$ is.</details>
+
+# %% jupyter={"source_hidden": true}
+# Checks
+grid = np.linspace(0, 1, 100_001)
+cheapest = [grid[np.argmin((grid - 1) ** 2 + p * np.maximum(0, grid - 0.25))] - 0.25 for p in (0.5, 1.4, 1.6)]
+off = max(abs(violate(p) - best) for p, best in zip((0.5, 1.4, 1.6), cheapest, strict=True))
+is_exact = violate(1.4) > 0 == violate(1.6)
+record.check(
+    "a price above the multiplier is exact", is_exact and off < 1e-4, f"{off:.0e} m/s off", always=True
+)
+wishes = [(v := choose_speed(2.0, room)[0]) <= 0.5 * room + 1e-9 and v >= 0 for room in (4.0, 0.5, 0.0)]
+record.check("the goal gives way, the barrier does not", all(wishes), wishes, always=True)
 
 # %% [markdown]
 # ## The paper's eq. 2 next to ours

@@ -56,7 +56,7 @@ from szlib.simulation.metrics import find_avoidance_start
 from szlib.workbook import figures
 from szlib.workbook.record import NotebookRecord
 
-record = NotebookRecord("09_passing", globals())
+record = NotebookRecord("09_passing", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario, zone, paper_zone = szlib.SCENARIOS["passing"], record.cache.ellipse(), record.cache.paper_ellipse()
 scenario_runs.list_parameters(settings)

@@ -21,7 +21,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [09](09_passing.ipynb) · next: [11 - Yielding: waiting and making
-# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 25 min · needs
+# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 20 min · needs
 # [09](09_passing.ipynb) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.
@@ -55,7 +55,7 @@ from szlib.simulation.metrics import classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 
-record = NotebookRecord("10_corridor", globals())
+record = NotebookRecord("10_corridor", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario = AtlasCell("corridor", width=width, pace=pace).scenario()
 scenario_runs.list_parameters(

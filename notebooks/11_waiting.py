@@ -59,7 +59,7 @@ from szlib.simulation.metrics import classify_strategy, find_yielding_steps
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 
-record = NotebookRecord("11_waiting", globals())
+record = NotebookRecord("11_waiting", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario_runs.list_parameters(
     settings,

@@ -27,8 +27,7 @@
 #
 # **Afterwards you can** choose settings for a robot among people and walls, and say where it will not
 # arrive. **Words.** *exact penalty*: a price on violations so high that none is paid where a solution
-# without violations exists; *priority*: what a plan obeys first if it cannot obey all: walls, then bodies,
-# then zones, then decay.
+# without violations exists.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook
@@ -56,7 +55,7 @@ from szlib.simulation.scenario import Scenario
 from szlib.workbook import figures
 from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters, read_table
 
-record = NotebookRecord("12_among_people", globals())
+record = NotebookRecord("12_among_people", globals(), plaza_zone=True)
 zone, paper = record.cache.ellipse(), szlib.MPCSettings.paper()
 among = replace(szlib.MPCSettings.among_people(), time_limit=np.inf)
 parameters(

@@ -42,7 +42,7 @@ from laboratory import PRESETS, Laboratory, RobotOptions, World, draw_step, expl
 import szlib
 from szlib.workbook.record import NotebookRecord
 
-record = NotebookRecord("13_laboratory", globals())
+record = NotebookRecord("13_laboratory", globals(), plaza_zone=True)
 
 # %% jupyter={"source_hidden": true}
 # The zone of notebook 05

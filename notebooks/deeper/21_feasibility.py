@@ -63,7 +63,7 @@ from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, para
 
 # %% jupyter={"source_hidden": true}
 # The record of the run
-record = NotebookRecord("21_feasibility", globals())
+record = NotebookRecord("21_feasibility", globals(), plaza_zone=True)
 settings = szlib.MPCSettings()
 parameters(
     [

@@ -53,7 +53,7 @@ from szlib.simulation.closed_loop import LoopSettings, drive
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
-record = NotebookRecord("22_distances", globals())
+record = NotebookRecord("22_distances", globals(), plaza_zone=True)
 settings = szlib.MPCSettings()
 r, eps = settings.r_robot, settings.eps
 parameters(

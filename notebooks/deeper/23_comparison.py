@@ -56,7 +56,7 @@ from szlib.workbook.record import ASSUMED, NotebookRecord, parameters
 
 # %% jupyter={"source_hidden": true}
 # The record of the run
-record = NotebookRecord("23_comparison", globals())
+record = NotebookRecord("23_comparison", globals(), plaza_zone=True)
 parameters(
     [
         ("worlds", worlds, ASSUMED, "the same ones for every method"),

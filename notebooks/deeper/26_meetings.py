@@ -57,7 +57,7 @@ from szlib.simulation.scenario import Variations
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 
-record = NotebookRecord("26_meetings", globals())
+record = NotebookRecord("26_meetings", globals(), plaza_zone=True)
 zone = record.cache.ellipse()
 
 # %% jupyter={"source_hidden": true}

@@ -51,7 +51,7 @@ from szlib.simulation.metrics import STRATEGIES, classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
 
-record = NotebookRecord("27_atlas", globals())
+record = NotebookRecord("27_atlas", globals(), plaza_zone=True)
 size = "{:.2f} m x {:.2f} m".format(*REFERENCE.semi_axes)
 parameters(
     [

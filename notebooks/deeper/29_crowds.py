@@ -62,7 +62,7 @@ from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, paramet
 
 # %% jupyter={"source_hidden": true}
 # The record, and the settings
-record = NotebookRecord("29_crowds", globals())
+record = NotebookRecord("29_crowds", globals(), plaza_zone=True)
 ours, bold = (crowd_trials.SETTINGS[name] for name in ("MPC-CBF", "MPC-CBF, gamma 0.2"))
 crowded, sight = crowd_trials.CROWDED, f"{replay.SENSING_RANGE:g} m"
 alone = f"{replay.MIN_START_DISTANCE:g} m"

@@ -104,14 +104,15 @@ judges.check("triangle_ellipse", triangle_ellipse)
 #
 # `samples` are the encounters of a fresh plaza: columns `encounter`, `los_angle` [rad], `distance`
 # [m], `speed` of the reference pedestrian [m/s]. Everybody keeps out of everybody's zone, but one in
-# a hundred walks right through it. Its size is drawn anew each time. Find the zone of people who walk
-# at 1.1 m/s, as a `szlib.Ellipse` in the person's frame, centre and semi-axes within 10 cm. Of
-# szlib you may use `szlib.Ellipse` only. The zones of the check are narrow and wide.
+# a hundred walks right through it. Find the zone of people who walk at `speed` [m/s], as a `szlib.Ellipse` in the
+# person's frame: centre and semi-axes within 10 cm and, where the semi-axes differ, the angle within 0.2 rad.
+# Width, length, centre, angle, speed, and whether zones grow or shrink with speed are drawn anew each
+# time, each for itself. Of szlib you may use `szlib.Ellipse` only.
 
 
 # %%
-def my_zone(samples):
-    """The zone at 1.1 m/s, a szlib.Ellipse in the person's frame."""
+def my_zone(samples, speed):
+    """The zone at this speed [m/s], a szlib.Ellipse in the person's frame."""
     # YOUR CODE HERE
     raise NotImplementedError()
 

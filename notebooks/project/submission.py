@@ -3,25 +3,35 @@
     python submission.py FILE    (the judge starts it)
 
 The process gets one JSON line for each new world and for each step, with what a robot would measure, and answers
-each with one line. It knows neither the seed nor the scenario.
+each with one line. It knows neither the seed nor the scenario. Where the system allows it, the process sees no
+other process and no network (`unshare`).
 """
 
 import contextlib
+import ctypes
+import functools
 import json
 import os
 import runpy
-import signal
+import shutil
 import subprocess
 import sys
 import traceback
 from pathlib import Path
+from time import monotonic
 from types import SimpleNamespace
 
 import numpy as np
+import psutil
 
 import szlib
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "exercises"))  # for `judges`
+from judges.process import Process
+
 RULES = szlib.MPCSettings()  # time step, sizes and limits of the robot
+STARTING = 120.0  # time that Python and szlib may take to start [s]; it does not count for the submission
+OWN_WORLD = ("--user", "--map-root-user", "--pid", "--fork", "--kill-child", "--mount-proc", "--net", "--ipc")
 
 
 # --- in the process of the judge ----------------------------------------------------------------------
@@ -31,39 +41,64 @@ class RefusedError(Exception):
     """A submission is refused in a meeting; the text says why."""
 
 
+@functools.cache
+def find_prefix():
+    """The program that starts a submission where it sees nobody else; () where the system does not allow it."""
+    if not (unshare := shutil.which("unshare")):
+        return ()
+    prefix = (unshare, *OWN_WORLD)
+    tried = subprocess.run([*prefix, sys.executable, "-c", ""], capture_output=True, check=False)
+    return prefix if tried.returncode == 0 else ()
+
+
+def adopt_orphans():
+    """Become the parent of processes that a submission leaves behind (Linux), so that they can be ended."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER
+
+
 class Submission(szlib.control.Controller):
     """The controller of a `file`, in a process of its own, as the closed loop sees it."""
 
-    def __init__(self, file):
-        command = [sys.executable, str(Path(__file__).resolve()), str(file)]
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-        self.process = subprocess.Popen(command, text=True, start_new_session=True, **pipes)
-        self.is_late = False
+    def __init__(self, file, time_limit=60.0):
+        adopt_orphans()
+        self._before = {child.pid for child in psutil.Process().children(recursive=True)}
+        self.process = Process([str(Path(__file__).resolve()), str(file)], find_prefix())
+        self.time_limit, self._deadline = time_limit, monotonic() + time_limit
+        if self.process.receive(monotonic() + STARTING) != b"ready\n":
+            self.end()
+            raise RefusedError("does not start")
 
-    def stop(self):
-        """End the process because the time is over."""
-        self.is_late = True
-        self.end()
+    def begin_world(self, world, zone):
+        """Send a new world; its time begins."""
+        self._deadline = monotonic() + self.time_limit
+        return self.ask(walls=world.walls.tolist(), zone=(zone.center, zone.semi_axes, zone.angle))
 
     def end(self):
-        """End the process, and on POSIX those that it has started."""
-        with contextlib.suppress(ProcessLookupError):  # they have ended
-            os.killpg(self.process.pid, signal.SIGKILL) if hasattr(os, "killpg") else self.process.kill()
+        """End the process and all that it has started."""
+        self.process.end()
+        for child in psutil.Process().children(recursive=True):
+            if child.pid not in self._before:
+                with contextlib.suppress(psutil.Error):
+                    child.kill()
+                    child.wait(1.0)
 
     def ask(self, **message):
         """Send a message, and return the control in the answer."""
-        with contextlib.suppress(BrokenPipeError):  # the process has ended; its last answer may say why
-            print(json.dumps(message), file=self.process.stdin, flush=True)
-        text = self.process.stdout.readline(4096)
+        self.process.send(json.dumps(message).encode() + b"\n", self._deadline)
+        text = self.process.receive(self._deadline)
+        if text is None:
+            raise RefusedError("is too slow")
         if not text:
-            code = self.process.wait()
-            raise RefusedError("is too slow" if self.is_late else f"ends its process with exit code {code}")
+            raise RefusedError(f"ends its process with exit code {self.process.wait()}")
         try:
-            answer = json.loads(text)
+            answer = json.loads(text[:4096])
             if "error" not in answer:
                 return np.array(answer["control"], float)
         except (KeyError, TypeError, ValueError) as error:
-            raise RefusedError(f"answers {text[:60]!r}; expected an acceleration") from error
+            raise RefusedError(
+                f"answers {text[:60].decode(errors='replace')!r}; expected an acceleration"
+            ) from error
         raise RefusedError(f"fails: {answer['error']}")
 
     def step(self, state, goal, people):
@@ -103,6 +138,9 @@ def describe(error, file):
 if __name__ == "__main__":
     file, answers = sys.argv[1], os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what the submission prints is not an answer
+    for name in szlib.__all__:
+        getattr(szlib, name)  # loaded now, so that it does not count
+    print("ready", file=answers, flush=True)
     try:
         for control in answer(sys.stdin, runpy.run_path(file)["make_controller"]):
             print(json.dumps({"control": control}), file=answers, flush=True)

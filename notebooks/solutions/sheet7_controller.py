@@ -245,10 +245,10 @@ judges.check("mpc_cbf_2d", mpc_cbf_2d)
 # %% [markdown]
 # ## 7.7 gamma and N_h (30 min)
 #
-# Robots with other brakes take the controller of 7.5: `a_max` [m/s2] is between 0.4 and 2. Give $\gamma$ and
+# Robots with other brakes take the controller of 7.5: `a_max` [m/s2] is between 0.25 and 2. Give $\gamma$ and
 # $N_h$, from 2 to N, for each. A person stands 20 cm farther than needed behind the goal, or comes towards the robot with
 # up to 0.65 m/s. With a large $\gamma$ the robot finds out too late that it cannot brake, and the program has
-# no solution; with a small one it creeps, and does not arrive in time: 22 s for the weakest brakes, 9.8 s for
+# no solution; with a small one it creeps, and does not arrive in time: 28 s for the weakest brakes, 9.6 s for
 # the best ones (a_max > 1.6). Below is one of the worlds; `number` goes from 1 to 4.
 
 # %%

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import jupytext
-from judges import SHEETS, Task
+from judges.answers import Answer, Refusal, pack
+from judges.client import Verdict
+from judges.sheets import SHEETS
+from judges.task import Task
 
 from szlib.workbook import folders
 
@@ -41,3 +45,24 @@ def defined(sheet: str, folder: Path) -> dict[str, Any]:
 def solution(name: str) -> Any:
     """The answer of the sheet's solution."""
     return defined(TASKS[name][0], SOLUTIONS)[name]
+
+
+def judge(
+    name: str, answer: Callable[..., Any] | str, seeds: Iterable[int]
+) -> Iterator[Verdict]:
+    """The verdicts on an answer, a function or the source of one, in one process."""
+    task = TASKS[name][2]
+    try:
+        packed = (
+            {"source": answer, "name": name}
+            if isinstance(answer, str)
+            else pack(answer)
+        )
+    except Refusal as refusal:
+        for _ in seeds:
+            yield Verdict(name, False, str(refusal))
+        return
+    with Answer(packed, task.allowed, task.seconds) as process:
+        for seed in seeds:
+            process.renew()
+            yield task.check(process, seed)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pandas as pd
+import psutil
 import pytest
 
 import szlib
@@ -60,13 +61,11 @@ for i in range(3, 20):
 
 
 @pytest.fixture
-def run(tmp_path):
+def run():
     """`run(source, meeting, worlds, limit)`: the row of a submission with this source."""
 
     def run(source, meeting="pedestrian obstruction", worlds=1, limit=LONG):
-        file = tmp_path / "mine.py"
-        file.write_text(source)
-        return judging.judge(file, meeting, list(range(worlds)), limit)
+        return judging.judge("mine", source, meeting, list(range(worlds)), limit)
 
     return run
 
@@ -123,14 +122,50 @@ def test_a_faulty_submission_is_refused_with_the_reason(run, source, reason):
 
 
 @pytest.mark.parametrize(
-    "start", ["", "import os\nif not os.fork():\n    time.sleep(3600)\nos._exit(0)"]
+    "start",
+    [
+        "",
+        "import os\nif not os.fork():\n    time.sleep(3600)",
+        "import os\nif not os.fork():\n    os.setsid()\n    time.sleep(3600)",
+        "import os\nos.setsid()",
+        "import signal\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)",
+    ],
 )
 def test_a_submission_that_takes_too_long_is_refused(run, start):
     """Also if it leaves a process that holds the pipe."""
     if start and not hasattr(os, "fork"):
         pytest.skip("needs fork")
+    before = {each.pid for each in psutil.Process().children(recursive=True)}
     row = run(f"import time\n{start}\ntime.sleep(3600)", limit=0.5)
     assert row["refused"] == "is too slow (in world 1)"
+    left = {each.pid for each in psutil.Process().children(recursive=True)} - before
+    assert not left
+
+
+def test_a_submission_sees_no_other_process(run):
+    """Neither its judge, whose command line may hold a seed, nor a sibling."""
+    if not judging.find_prefix():
+        pytest.skip("unshare is not allowed here")
+    source = "import os, psutil\nothers = [p.pid for p in psutil.process_iter() if p.pid != os.getpid()]\n"
+    row = run(source + OWN.format(control="[len(others)]"))
+    assert row["refused"].startswith("gives the acceleration [0.0]"), row
+
+
+def test_files_of_the_same_name_have_rows_of_their_own(tmp_path):
+    files = [tmp_path / who / "submission" / "my_controller.py" for who in ("a", "b")]
+    for file in files:
+        file.parent.mkdir(parents=True)
+        file.write_text(PLAIN)
+    names = list(judging.read_submissions(files))
+    assert names[0] == f"{tmp_path.name}/a/submission/my_controller"
+    assert len(names) == len(set(names)) == 2 + len(judging.RIVALS)
+
+
+def test_the_result_is_a_distance_to_the_rivals():
+    rivals = {"rivals/paper": 40.0, "rivals/tuned": 60.0, "me": 0.0}
+    board = pd.DataFrame({"controller": rivals.keys(), "points": rivals.values()})
+    scores = [judging.score(points, board) for points in (0, 40, 50, 60, 65, 70, 100)]
+    assert scores == [0, 0, 10, 20, 25, 30, 30]
 
 
 EDIT = """
@@ -164,10 +199,9 @@ def find(state):
 """
 
 
-def test_a_submission_does_not_find_the_world_or_its_seed(tmp_path):
-    file = tmp_path / "spy.py"
-    file.write_text(SPY + OWN.format(control="find(state)"))
-    row = judging.judge(file, "blind corner", [4711], LONG)
+def test_a_submission_does_not_find_the_world_or_its_seed():
+    source = SPY + OWN.format(control="find(state)")
+    row = judging.judge("spy", source, "blind corner", [4711], LONG)
     assert "RuntimeError: 0 scenarios, 0 seeds" in row["refused"]
 
 
@@ -181,12 +215,10 @@ def test_the_motors_have_limits(tmp_path):
     file = tmp_path / "rocket.py"
     file.write_text(OWN.format(control="np.array([1e9, -1e9])"))
     rocket, world = Submission(file), szlib.MEETINGS["frontal approach"]
-    rocket.ask(walls=[], zone=((0, 0), (1, 1), 0))
-    log = szlib.simulation.drive(
-        world, rocket, LoopSettings(settings=RULES, max_time=3.0)
-    )
+    rocket.begin_world(world, szlib.Ellipse((0, 0), (1, 1)))
+    loop = LoopSettings(settings=RULES, max_time=3.0)
+    log = szlib.simulation.drive(world, rocket, loop)
     rocket.end()
-    rocket.process.communicate()
     assert abs(log.controls).max() <= RULES.a_max + 1e-9
     assert log.speed.max() == pytest.approx(RULES.v_max)
 

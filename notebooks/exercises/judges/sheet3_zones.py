@@ -20,12 +20,16 @@ from szlib.zones.ellipses import Ellipse
 from szlib.zones.enclosing_ellipse import minimum_enclosing_ellipse
 from szlib.zones.hulls import Slice
 
+from .answers import Other
 from .task import Args, Rng, make_task, repeat
 
-_TOLERANCE = 0.10  # largest error of the learner's zone, in centre and semi-axes [m]
-_SPEED = 1.1  # walking speed of the zone [m/s] (paper, sec. 4)
+_TOLERANCE, _TURN = (0.10, 0.2)  # largest error of the learner's zone: centre, semi-axes [m]; angle [rad]
+_SPEED = 1.1  # walking speed of a slice [m/s] (paper, sec. 4)
 _R_MAX = 2.0  # paper, sec. 2 [m]
-_WIDTHS = ((0.5, 0.6), (0.85, 0.95))  # shorter semi-axes of a narrow and of a wide zone [m]
+_WIDTHS = ((0.5, 0.58), (0.85, 0.92))  # shorter semi-axes of a narrow and of a wide zone [m]
+_EXTRAS = ((0.0, 0.04), (0.46, 0.5))  # by which the longer semi-axis is longer: round and long zones [m]
+_SPEEDS = ((0.7, 0.8), (1.25, 1.35))  # walking speeds of the zone that is asked for [m/s]
+_GROWTH = 0.24  # of each semi-axis for each 1 m/s of speed, up or down [s]
 _ORIGIN = shapely.Point(0, 0)
 
 
@@ -47,7 +51,7 @@ def _crossing(a: Any, b: Any, speed: float) -> Any:
 def _draw_polygon(rng: Rng) -> Args:
     corner = np.radians(np.arange(0, 360, 60) + rng.uniform(5, 55, 6))
     polygon = np.column_stack([1.3 * np.cos(corner), 1.0 * np.sin(corner)]).round(2)
-    return polygon, round(rng.uniform(-np.pi, np.pi), 2), round(_R_MAX + rng.uniform(-0.2, 0.5), 1)
+    return (polygon, round(rng.uniform(-np.pi, np.pi), 2), round(_R_MAX + rng.uniform(-0.2, 0.5), 1))
 
 
 def _reach(polygon: Any, theta: float) -> float:
@@ -78,35 +82,55 @@ def _circumscribed(triangle: Any) -> float:
 
 
 @lru_cache(maxsize=4)
-def _plaza(seed: int, a: float, b: float) -> tuple[pd.DataFrame, Ellipse]:
-    """Samples from a plaza with a random zone, and that zone."""
-    slow, fast = (Ellipse((0.05, 0.0), (a + grow, b + grow)) for grow in (-0.04, 0.04))
+def _plaza(seed: int, zone: Ellipse, speed: float, growth: float) -> tuple[pd.DataFrame, float, Ellipse]:
+    """Samples from a plaza where people who walk at `speed` have the `zone`, the speed, and the zone."""
+
+    def at(other: float) -> Ellipse:
+        axes = np.add(zone.semi_axes, growth * (other - speed))
+        return Ellipse(zone.center, (axes[0], axes[1]), zone.angle)
+
     settings = PlazaSettings(
-        n_encounters=1500, slow_zone=slow, fast_zone=fast, intruders=0.01, intruder_speeds=SLOW_INTRUDERS
+        n_encounters=1500,
+        slow_zone=at(0.5),
+        fast_zone=at(1.5),
+        intruders=0.01,
+        intruder_speeds=SLOW_INTRUDERS,
     )
     with tempfile.TemporaryDirectory() as folder:
         file = make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)
-        return find_encounters(read_tracks(file)), settings.true_zone(_SPEED)
+        return find_encounters(read_tracks(file)), speed, settings.true_zone(speed)
 
 
 def _draw_plazas(rng: Rng) -> Iterator[Args]:
-    """A plaza with a narrow zone and one with a wide zone, in either order: no constant fits both."""
-    for low, high in rng.permutation(_WIDTHS):
-        b = round(rng.uniform(low, high), 2)
-        yield _plaza(int(rng.integers(2**31)), round(b + rng.uniform(0.15, 0.3), 2), b)
+    """A narrow and a wide zone, a round and a long one; centre, angle, speed and growth for themselves.
+
+    Semi-axes that differ by 0.46 m or by nothing: no fixed difference is within the tolerance of both.
+    """
+    kinds = [(0, 0), (1, 1), (0, 1), (1, 0)]
+    for narrow, long in rng.permutation([kinds[0], kinds[1], kinds[int(rng.integers(2, 4))]]):
+        b, extra = rng.uniform(*_WIDTHS[narrow]), rng.uniform(*_EXTRAS[long])
+        angle = rng.uniform(0.28, 0.36) * rng.choice([-1, 1])
+        zone = Ellipse(
+            (round(rng.uniform(0, 0.06), 2), 0.0), (round(b + extra, 2), round(b, 2)), round(angle, 2)
+        )
+        speed = round(rng.uniform(*_SPEEDS[int(rng.integers(2))]), 2)
+        yield _plaza(int(rng.integers(2**31)), zone, speed, _GROWTH * int(rng.choice([-1, 1])))
 
 
 def _judge_zone(args: Args, got: Any) -> str:
     """Accept an ellipse whose centre and semi-axes are near those of the true zone."""
     if not isinstance(got, Ellipse):
-        return f"expected a szlib.Ellipse in the person's frame; got {type(got).__name__}"
-    truth = args[1]
+        kind = got.kind if isinstance(got, Other) else type(got).__name__
+        return f"expected a szlib.Ellipse in the person's frame; got {kind}"
+    truth = args[-1]
     (a, b), (true_a, true_b) = got.semi_axes, truth.semi_axes
     off = np.subtract([*got.center, a, b], [*truth.center, true_a, true_b])
+    turn = abs(float(np.arctan(np.tan(got.angle - truth.angle))))
     if np.abs(off).max() <= _TOLERANCE:
-        return ""
+        is_turned = true_a - true_b > 0.3 and turn > _TURN
+        return f"the angle is off by {turn:.2f} rad; at most {_TURN} rad is allowed" if is_turned else ""
     found = f"semi-axes {a:.2f} x {b:.2f} m, off by {off[2]:+.2f} and {off[3]:+.2f} m"
-    if abs(np.sin(got.angle)) > 0.7 and a - b > 0.03:  # r_max - R' is long where R' is short
+    if np.hypot(a - (_R_MAX - true_b), b - (_R_MAX - true_a)) < 0.2:
         return f"{found}: this is an ellipse around the slice; map to r_max - R' first, then enclose"
     if a * b < 0.9 * true_a * true_b:
         return f"{found}: too small; a few people walk through zones, and must not determine yours"
@@ -125,6 +149,12 @@ TASKS = (
     ),
     make_task(globals(), "triangle_ellipse", repeat(_draw_triangle), solution=_smallest),
     make_task(
-        globals(), "my_zone", _draw_plazas, judge=_judge_zone, hidden=1, allowed=("szlib.zones.ellipses",)
+        globals(),
+        "my_zone",
+        _draw_plazas,
+        judge=_judge_zone,
+        hidden=1,
+        allowed=("szlib.zones.ellipses",),
+        seconds=60.0,
     ),
 )

@@ -177,7 +177,7 @@ def _draw_scenes(rng: Rng) -> Iterator[Args]:
 
 TASKS = (
     make_task(globals(), "speed_limit", repeat(_draw_approach), solution=_limit),
-    make_task(globals(), "largest_gamma", _draw_robots, solution=_largest, allowed=("szlib",)),
+    make_task(globals(), "largest_gamma", _draw_robots, solution=_largest, allowed=("szlib",), seconds=300.0),
     make_task(
         globals(),
         "next_plan",

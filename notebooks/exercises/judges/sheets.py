@@ -1,14 +1,15 @@
-"""Check an answer, read a hint, or draw a case again: `check`, `hint`, `case`, `plot`."""
+"""The tasks of all sheets; judge an answer, read a hint, or draw a case again."""
 
 from __future__ import annotations
 
-import secrets
+from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from typing import Any
 
 from szlib.errors import DataError
 
-from .task import ESSAY_MINUTES, Answer, Args, Task, Verdict
+from .answers import Answer
+from .task import ESSAY_MINUTES, Args, Task, Verdict
 
 _SHEETS = "sheet1_tracks sheet2_outliers sheet3_zones sheet4_certainty sheet5_barriers sheet6_robot sheet7_controller"
 SHEETS: dict[str, tuple[Task, ...]] = {
@@ -17,35 +18,13 @@ SHEETS: dict[str, tuple[Task, ...]] = {
 """The tasks of each sheet, in order."""
 
 
-def check(name: str, answer: Answer, *, seed: int | None = None) -> Verdict:
-    """Check an answer, and say what is correct or wrong.
-
-    Parameters
-    ----------
-    name : name of the task.
-    answer : the function itself, not its result.
-    seed : seed of the cases; None draws fresh cases each time.
-
-    Returns
-    -------
-    The verdict. Its text stands below the cell.
-
-    Raises
-    ------
-    DataError : there is no such task.
-
-    Examples
-    --------
-    >>> import judges
-    >>> def speed_limit(h, gamma, dt, person_speed):
-    ...     return gamma * h / dt - person_speed
-    >>> judges.check("speed_limit", speed_limit, seed=1)
-    passed - speed_limit: correct in 40 fresh cases
-    """
-    task = _find_task(name)
-    if not callable(answer):
-        return Verdict(name, False, f"give the function itself, check({name!r}, {name}), not its result")
-    return task.check(answer, secrets.randbelow(10**6) if seed is None else seed)
+def judge(name: str, packed: dict[str, str], seeds: Iterable[int]) -> Iterator[Verdict]:
+    """Judge a packed answer in the cases of each seed, all in one process of the answer."""
+    task = find_task(name)
+    with Answer(packed, task.allowed, task.seconds) as answer:
+        for seed in seeds:
+            answer.renew()
+            yield task.check(answer, seed)
 
 
 def case(name: str, seed: int, number: int) -> Args:
@@ -57,12 +36,12 @@ def case(name: str, seed: int, number: int) -> Args:
     >>> judges.case("speed_limit", seed=1, number=2)
     (1.28, 0.102, 0.2, 1.34)
     """
-    return _find_task(name).case(seed, number)
+    return find_task(name).case(seed, number)
 
 
-def plot(name: str, answer: Answer, *, seed: int, number: int) -> None:
+def plot(name: str, answer: Callable[..., Any], *, seed: int, number: int) -> None:
     """Draw what the answer does in one world of a check of sheet 7."""
-    task = _find_task(name)
+    task = find_task(name)
     if task.plot is None:
         raise DataError(f"{name} has no worlds to draw; judges.case gives its arguments")
     task.plot(answer, task.case(seed, number))
@@ -86,7 +65,7 @@ def hint(name: str, number: int = 1) -> None:
     >>> judges.hint("velocity", 1)
     hint 1 of 3: Velocity is displacement divided by time.
     """
-    hints = _find_task(name).hints
+    hints = find_task(name).hints
     if not 1 <= number <= len(hints):
         raise DataError(f"{name} has hints 1 to {len(hints)}; got {number}")
     print(f"hint {number} of {len(hints)}: {hints[number - 1]}")
@@ -97,7 +76,8 @@ def sheet_minutes(sheet: str) -> int:
     return ESSAY_MINUTES + sum(task.minutes for task in SHEETS[sheet])
 
 
-def _find_task(name: str) -> Task:
+def find_task(name: str) -> Task:
+    """The task of this name."""
     tasks = {task.name: task for sheet in SHEETS.values() for task in sheet}
     if name not in tasks:
         raise DataError(f"there is no task {name!r}; the tasks are {', '.join(tasks)}")

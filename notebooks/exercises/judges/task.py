@@ -2,27 +2,26 @@
 
 Each check draws new cases from a seed, and a case that fails can be drawn again with that seed. Typical
 mistakes are functions as well: if one of them gives the learner's results in every case, the learner reads
-its message. An answer that calls szlib where the task is to write that function is no answer.
+its message. An answer is judged from a process of its own (`answers`), which has nothing of szlib but what
+the task allows.
 """
 
 from __future__ import annotations
 
 import inspect
-import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from szlib.errors import SzlibError
-
+from .answers import Failure, Other, Refusal
+from .client import Verdict
 from .qp import Infeasible
 
 Answer = Callable[..., Any]
@@ -35,36 +34,6 @@ Judge = Callable[[Args, Any], str]
 _MANY = 40  # cases of a check: a mistake that shows in one case of three passes once in ten million checks
 _MAX_SHOWN = 130  # numbers of an array in a message
 ESSAY_MINUTES = 10  # of a sheet
-
-
-class Refusal(Exception):
-    """An answer that is wrong for a reason other than its numbers."""
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """The result of a check.
-
-    Attributes
-    ----------
-    task : name of the task.
-    passed : True if the answer is correct in every case.
-    message : what is correct or wrong.
-    error : the exception that the learner's function raised; None if it raised none.
-    """
-
-    task: str
-    passed: bool
-    message: str
-    error: Exception | None = None
-
-    def __repr__(self) -> str:
-        return f"{'passed' if self.passed else 'not yet'} - {self.task}: {self.message}"
-
-    def require(self) -> None:
-        """Raise SzlibError with the message if the answer did not pass; graders count errors."""
-        if not self.passed:
-            raise SzlibError(repr(self)) from self.error
 
 
 @dataclass(frozen=True)
@@ -84,7 +53,8 @@ class Task:
     plot : function of (answer, arguments) that draws a case.
     mistakes : message -> function that makes this typical mistake.
     hidden : number of values at the end of a case that the judge sees, but not the answer.
-    allowed : modules of szlib and of the judges that an answer may call.
+    allowed : modules of szlib that an answer may use.
+    seconds : time of a check in the learner's function [s].
     tolerance : largest allowed difference of any number [unit].
     unit : unit of the result; "" if it has none.
     """
@@ -100,6 +70,7 @@ class Task:
     mistakes: Mapping[str, Answer] = field(default_factory=dict)
     hidden: int = 0
     allowed: tuple[str, ...] = ()
+    seconds: float = 20.0
     tolerance: float = 1e-6
     unit: str = ""
 
@@ -117,13 +88,10 @@ class Task:
                 calls.append([])
                 found = self._run(answer, args, calls[-1])
                 fault = fault or (f"{found}{self._replay(args, seed, number)}" if found else "")
-        except NotImplementedError as error:
-            return Verdict(self.name, False, "no answer yet: write it, then run this cell", error)
-        except Refusal as refusal:
-            return Verdict(self.name, False, f"{refusal}{self._replay(args, seed, number)}", refusal)
-        except Exception as error:
-            fault = f"your function stopped with {type(error).__name__}: {error}"
-            return Verdict(self.name, False, f"{fault}{self._replay(args, seed, number)}", error)
+        except NotImplementedError:
+            return Verdict(self.name, False, "no answer yet: write it, then run this cell")
+        except (Refusal, Failure) as error:
+            return Verdict(self.name, False, f"{error}{self._replay(args, seed, number)}")
         for case, made in enumerate(calls, 1):
             if not fault and (found := self._compare(made)):
                 fault = f"{found}{self._replay(self.case(seed, case), seed, case)}"
@@ -136,9 +104,7 @@ class Task:
         """Run the answer in one case, record its `calls`, and return what the judge refuses."""
 
         def ask(*arguments: Any) -> Any:
-            got = _call_watched(answer, deepcopy(arguments), self.allowed)
-            if got is None:
-                raise Refusal("your function returns None: does it end with `return`?")
+            got = answer(*arguments)
             calls.append((arguments, got))
             return got
 
@@ -224,29 +190,6 @@ def repeat(draw: Callable[[Rng], Args], n: int = _MANY) -> Callable[[Rng], Itera
     return lambda rng: (draw(rng) for _ in range(n))
 
 
-def _call_watched(answer: Answer, arguments: Args, allowed: tuple[str, ...]) -> Any:
-    """Call the answer; refuse it if it calls szlib or the judges, except what is in `allowed` modules."""
-    called: list[str] = []
-
-    def is_in(frame: FrameType | None, *rooms: str) -> bool:
-        return frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in rooms
-
-    def note(frame: FrameType, event: str, _: Any) -> None:
-        if event == "call" and is_in(frame, "szlib", "judges") and not is_in(frame.f_back, "szlib"):
-            module, name = frame.f_globals["__name__"], frame.f_code.co_qualname
-            if name != "<module>" and not module.startswith(allowed):
-                called.append(f"{module}.{name}")
-
-    outer = sys.getprofile()
-    sys.setprofile(None if "szlib" in allowed else note)
-    try:
-        return answer(*arguments)
-    finally:
-        sys.setprofile(outer)
-        if called:
-            raise Refusal(f"no answer: this calls {called[0]}; the task is to write it yourself")
-
-
 def compare(expected: Any, got: Any, tolerance: float, unit: str = "") -> str:
     """Describe how two results differ; "" if they agree."""
     if form := check_form(expected, got):
@@ -271,10 +214,9 @@ def compare(expected: Any, got: Any, tolerance: float, unit: str = "") -> str:
 def check_form(expected: Any, got: Any) -> str:
     """Describe how the type or the shape of two results differs; "" if they agree."""
     want = np.asarray(expected)
-    try:
-        have = np.asarray(got)
-    except ValueError:
-        return f"expected {_kind(want)}; got a {type(got).__name__} of parts of unequal length"
+    if isinstance(got, Other):
+        return f"expected {_kind(want)}; got a {got.kind}{' of parts of unequal length' * got.is_uneven}"
+    have = np.asarray(got)
     if have.dtype.kind not in "biuf":
         return f"expected {_kind(want)}; got a {type(got).__name__}"
     if have.shape != want.shape or (have.dtype == bool) != (want.dtype == bool):

@@ -20,6 +20,7 @@ from pandas.io.formats.style import Styler
 
 from ...files import claim_folder, write_file
 from ...input_files import read_json_object
+from ...tracks import datasets
 from .. import folders
 from .committed_tables import find_differences, read_table
 from .data_cache import DataCache
@@ -53,6 +54,7 @@ class NotebookRecord:
         data: "synthetic" or as for `szlib.tracks.datasets.find`; area: where encounters are found, as for
         `szlib.as_area`, "auto", or "" for the default of the data; seed: of everything random; results:
         folder of all results; and those of `ZoneMethod`.
+    plaza_zone : whether checks assume the zone of the plaza; with other data they are then observations.
 
     Attributes
     ----------
@@ -77,7 +79,9 @@ class NotebookRecord:
     check two is even  holds     2
     """
 
-    def __init__(self, name: str, variables: Mapping[str, Any]) -> None:
+    def __init__(
+        self, name: str, variables: Mapping[str, Any], *, plaza_zone: bool = False
+    ) -> None:
         self.name = name
         self.checks: list[dict[str, Any]] = []
         self.figures: list[str] = []
@@ -92,6 +96,8 @@ class NotebookRecord:
             n: variables[n] for n, v in defaults.items() if variables.get(n, v) != v
         }
         self.changed = {n: v for n, v in changed.items() if n not in NEUTRAL}
+        if plaza_zone and variables["data"] != datasets.SYNTHETIC:
+            self.changed["zone"] = "that of other data"
         if self.changed:
             print(
                 f"{self._settings()}: checks that assume the defaults are observations; text may not apply"

@@ -1,0 +1,106 @@
+"""The judges as a program: mark sheets that were handed in, without running them.
+
+    python notebooks/exercises/judges FILE.ipynb ... [--seed 7] [--out marks.csv]
+
+Each function of a sheet is taken from the text of its cells, and runs in a process of its own. Nothing that the
+sheet does to its own judges counts. `serve` in place of the files answers the checks of a notebook.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import re
+import secrets
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
+
+
+def read_source(file: Path) -> str:
+    """The code of a sheet: its cells that are Python, one after the other."""
+    import ast
+
+    import jupytext
+
+    sources = []
+    for cell in jupytext.read(file).cells:
+        if cell.cell_type == "code":
+            try:
+                ast.parse(cell.source)
+            except (SyntaxError, ValueError):
+                continue  # a command of IPython, or a cell that does not run either
+            sources.append(cell.source)
+    return "\n\n".join(sources)
+
+
+def mark_sheet(file: Path, seed: int) -> list[dict[str, object]]:
+    """A row for each task of the sheet: its points, and what the judge says."""
+    from judges.sheets import SHEETS, judge
+
+    source = read_source(file)
+    rows: list[dict[str, object]] = []
+    for sheet, tasks in SHEETS.items():
+        for task in tasks:
+            if re.search(rf"^def {task.name}\(", source, re.MULTILINE):
+                (verdict,) = judge(task.name, {"source": source, "name": task.name}, [seed])
+                points = task.minutes if verdict.passed else 0
+                message = " ".join(verdict.message.split())
+                row = {
+                    "file": str(file),
+                    "sheet": sheet,
+                    "task": task.name,
+                    "points": points,
+                }
+                rows.append(row | {"of": task.minutes, "message": message[:300]})
+    return rows
+
+
+def serve() -> None:
+    """Answer the checks of a notebook, a line of JSON each."""
+    from judges.sheets import judge
+    from szlib.errors import SzlibError
+
+    for line in sys.stdin:
+        question = json.loads(line)
+        try:
+            (verdict,) = judge(question["name"], question["answer"], [int(question["seed"])])
+            reply = {"passed": verdict.passed, "message": verdict.message}
+        except SzlibError as error:
+            reply = {"error": str(error)}
+        print(json.dumps(reply), flush=True)
+
+
+def main() -> None:
+    """Serve, or mark the sheets of the command line."""
+    if sys.argv[1:] == ["serve"]:
+        serve()
+        return
+    from judges.answers import end_programs
+
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("files", nargs="+", type=Path, help="sheets, .ipynb or .py")
+    parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6), help="default: a new one")
+    parser.add_argument("--out", type=Path, help="write a table (CSV)")
+    given = parser.parse_args()
+    rows = []
+    for file in given.files:
+        marks = mark_sheet(file, given.seed)
+        end_programs()  # nothing of a student's answers is there when those of the next one run
+        rows += marks
+        print(f"{file}: {sum(int(str(row['points'])) for row in marks)} points")
+        for row in marks:
+            print(f"    {row['points']:>3} of {row['of']:>3}  {row['task']}: {row['message']}")
+    print(f"--seed {given.seed} draws the same cases again")
+    if given.out and rows:
+        with given.out.open("w", newline="", encoding="utf-8") as table:
+            writer = csv.DictWriter(table, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()
