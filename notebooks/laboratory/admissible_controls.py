@@ -14,9 +14,9 @@ from matplotlib.patches import Rectangle
 from shapely.plotting import patch_from_polygon
 
 import szlib
-from szlib.checks import Array
 from szlib.control import Obstacles
 from szlib.control.problem import list_conditions
+from szlib.core.checks import Array
 from szlib.workbook import figures
 
 # Of the curves of limits: their reach, in half-widths of the box of accelerations, so that they cross it; the

@@ -19,10 +19,10 @@ from studies.distances import euclidean_to_ellipse, euclidean_to_segment
 from studies.rollout_table import interval
 
 import szlib
-from szlib.checks import Array
 from szlib.control.differential_drive import Unicycle
 from szlib.control.obstacles import ellipse_distance
 from szlib.control.settings import TOLERANCE
+from szlib.core.checks import Array
 from szlib.simulation.baseline_controllers import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.monte_carlo import RolloutSetup
 from szlib.simulation.scenario import GOAL_RADIUS, ONE_PERSON, Worlds

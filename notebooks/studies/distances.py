@@ -28,9 +28,9 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 import szlib
-from szlib.checks import Array, check_array
 from szlib.control import Wall, ellipse_distance, segment_distance
 from szlib.control.obstacles import check_wall
+from szlib.core.checks import Array, check_array
 from szlib.workbook import figures
 from szlib.zones.ellipses import Ellipse
 

@@ -19,8 +19,8 @@ import pandas as pd
 from studies.distances import euclidean_to_ellipse
 
 import szlib
-from szlib.checks import Array
 from szlib.control.people import as_ellipse
+from szlib.core.checks import Array
 from szlib.simulation import ZONES as SIMPLE_ZONES
 from szlib.simulation import Run
 from szlib.zones.ellipses import Ellipse

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from szlib.checks import Array
 from szlib.control.controller import Controller
 from szlib.control.people import Person
 from szlib.control.settings import MPCSettings
+from szlib.core.checks import Array
+from szlib.core.errors import DataError
 from szlib.encounters.areas import area_for
 from szlib.encounters.geometry import Area
-from szlib.errors import DataError
 from szlib.simulation.crowds import MIN_HEADING_SPEED, Crowd, CrowdModel
 from szlib.simulation.scenario import Scenario
 from szlib.tracks.clock import TICKS_PER_SECOND, clock_index

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from szlib.checks import Array
 from szlib.control.obstacles import barrier, ellipse_distance
 from szlib.control.settings import TOLERANCE
+from szlib.core.checks import Array
 from szlib.encounters.geometry import wrap_angle
 from szlib.simulation.robot_run import Run
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from szlib.checks import Array
 from szlib.control.obstacles import ellipse_distance
+from szlib.core.checks import Array
 from szlib.encounters.geometry import wrap_angle
 from szlib.simulation.metrics import measure_path_length
 from szlib.simulation.robot_run import Run, nanmin

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from studies.literature_zones import ZONES
 
-from szlib.errors import SolverError
+from szlib.core.errors import SolverError
 from szlib.simulation import METHOD
 
 METRICS = (

@@ -51,8 +51,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array, check_vector
-from ..errors import SolverError
+from ..core.checks import Array, check_array, check_vector
+from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
 from .obstacles import Obstacle, Obstacles, Path

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from ..checks import Array
+from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .obstacles import Wall, Zone
 from .settings import TOLERANCE

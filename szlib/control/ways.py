@@ -26,7 +26,7 @@ from scipy.ndimage import binary_dilation
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from ..checks import Array
+from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
 from .obstacles import Obstacles, Zone, barrier, find_bodies, find_places
 from .people import STANDING_SPEED

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import Array
 from ..control import MPCCBF, Body, Controller, MPCSettings, Obstacles, Person
+from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
 

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import Array
 from ..control import Controller, MPCSettings, Obstacle, Person, as_controller
 from ..control.people import SpeedZone, as_ellipse
-from ..errors import SolverError
+from ..core.checks import Array
+from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .crowds import UNAFFECTED, Crowd, CrowdModel
 from .log import SimulationLog

@@ -20,9 +20,9 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 import shapely
 
-from ..checks import Array, check_array, require
 from ..control import MPCSettings, Person
-from ..errors import SolverError
+from ..core.checks import Array, check_array, require
+from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS
 from .scenario import Scenario
 

@@ -16,9 +16,9 @@ import pandas as pd
 from .. import __version__
 from ..control import MPCSettings, Person
 from ..control.obstacles import describe, number_kinds, restore
-from ..errors import DataError, SzlibError
-from ..files import write_file
-from ..input_files import open_regular, read_small
+from ..core.errors import DataError, SzlibError
+from ..core.files import write_file
+from ..core.input_files import open_regular, read_small
 from ..zones.ellipses import Ellipse
 from .metrics import compute_metrics
 from .robot_run import Run, nanmin

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
-from ..checks import Array
 from ..control import STATUSES, Obstacles, Zone
 from ..control.settings import TOLERANCE
+from ..core.checks import Array
 from .robot_run import Run, nanmin
 from .scenario import GOAL_RADIUS, STOPPED_SPEED
 

@@ -28,11 +28,11 @@ from joblib import delayed
 from tqdm import tqdm
 
 from .. import __version__
-from ..checks import require
 from ..control import MPCSettings
-from ..errors import SolverError, SzlibError
-from ..files import claim_folder, load_cached, store_cached, write_file
-from ..parallel import run_tasks
+from ..core.checks import require
+from ..core.errors import SolverError, SzlibError
+from ..core.files import claim_folder, load_cached, store_cached, write_file
+from ..core.parallel import run_tasks
 from ..zones.ellipses import Ellipse
 from .baseline_controllers import CONTROLLERS, ControllerFactory, make_mpc_cbf
 from .closed_loop import BODY_ZONE, LoopSettings, ZoneTransform, drive

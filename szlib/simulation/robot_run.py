@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Array, require
 from ..control import MPCSettings, Obstacles, Person, barrier, ellipse_distance
+from ..core.checks import Array, require
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
 

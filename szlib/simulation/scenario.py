@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import Array, check_array, require
 from ..control import (
     MPCSettings,
     Obstacle,
@@ -23,7 +22,8 @@ from ..control import (
     Zone,
 )
 from ..control.obstacles import check_wall, euclidean_segment_formula
-from ..errors import SolverError
+from ..core.checks import Array, check_array, require
+from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 
 GOAL_RADIUS = 0.1  # the robot has arrived within this distance of the goal [m], when it has stopped (assumed)

@@ -9,8 +9,8 @@ import pytest
 from studies.distances import euclidean_to_segment
 
 import szlib
-from szlib.checks import Array
 from szlib.control import HalfPlane, Obstacles, Wall, advance, mpc
+from szlib.core.checks import Array
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 S = szlib.MPCSettings(time_limit=np.inf)

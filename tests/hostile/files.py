@@ -1,6 +1,6 @@
 """A disk that is full at each write in turn, damaged files, and clocks that jump: no result is wrong.
 
-Every file is written by `szlib.files`, where the fault is put in: half of the bytes are written, then there
+Every file is written by `szlib.core.files`, where the fault is put in: half of the bytes are written, then there
 is no room.  Afterwards finished files are intact, and the same call makes the same bytes (except for the
 times of steps).
 """
@@ -27,7 +27,7 @@ from helpers.faulty_disk import FaultyDisk
 
 import szlib
 from szlib import files
-from szlib.errors import DataError, StorageError, ZoneError
+from szlib.core.errors import DataError, StorageError, ZoneError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.simulation.monte_carlo import RolloutSetup, rollouts

@@ -15,7 +15,7 @@ import pytest
 
 import szlib
 from szlib import memory
-from szlib.errors import MemoryLimitError, StorageError
+from szlib.core.errors import MemoryLimitError, StorageError
 from szlib.tracks import datasets
 from szlib.tracks.formats import unpack
 from szlib.tracks.readers import read_raw

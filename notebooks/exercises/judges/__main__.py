@@ -62,7 +62,7 @@ def mark_sheet(file: Path, seed: int) -> list[dict[str, object]]:
 def serve() -> None:
     """Answer the checks of a notebook, a line of JSON each."""
     from judges.sheets import judge
-    from szlib.errors import SzlibError
+    from szlib.core.errors import SzlibError
 
     for line in sys.stdin:
         question = json.loads(line)

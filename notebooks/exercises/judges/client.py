@@ -10,7 +10,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from szlib.errors import DataError, SzlibError
+from szlib.core.errors import DataError, SzlibError
 
 from .answers import Refusal, pack
 from .process import Process

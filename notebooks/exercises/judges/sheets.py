@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from typing import Any
 
-from szlib.errors import DataError
+from szlib.core.errors import DataError
 
 from .answers import Answer
 from .task import ESSAY_MINUTES, Args, Task, Verdict

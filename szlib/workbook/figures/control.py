@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
-from ...checks import Array
 from ...control.obstacles import (
     Obstacle,
     Wall,
@@ -22,6 +21,7 @@ from ...control.obstacles import (
     segment_distance,
 )
 from ...control.step import Step
+from ...core.checks import Array
 from ...zones.ellipses import Ellipse
 from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from .style import add_legend_below, draw_person, get_axes, label_metres

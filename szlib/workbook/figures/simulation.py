@@ -18,7 +18,7 @@ from matplotlib.patches import Ellipse as EllipsePatch
 from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
-from ...checks import Array
+from ...core.checks import Array
 from ...simulation import Run, Scenario
 from ...simulation.robot_run import nanmin
 from ...zones.ellipses import Ellipse
