@@ -19,7 +19,7 @@ from dask_jobqueue import SLURMCluster
 from distributed import LocalCluster, SSHCluster
 
 import szlib
-from szlib.parallel import cluster
+from szlib.core.parallel import cluster
 
 JOB = {"cores": 1, "memory": "4GB", "walltime": "04:00:00"}  # of SLURM
 QUEUE = 24 * 3600.0  # longest wait for the first process [s]

@@ -14,7 +14,7 @@ import shapely
 import traitlets
 
 import szlib
-from szlib.checks import require
+from szlib.core.checks import require
 from szlib.workbook.figures.movies import read_scripts, scene_layout, snapshot
 
 from .explanation import explain, name_limit

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import szlib
-from szlib.checks import Array, check_array, check_number, require
 from szlib.control.controller import advance
+from szlib.core.checks import Array, check_array, check_number, require
 from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
 
 _TWO_DOORS = szlib.Scenario(

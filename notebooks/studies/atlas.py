@@ -19,11 +19,11 @@ import numpy as np
 import pandas as pd
 from studies.committed import write_table
 
-from szlib.checks import require
 from szlib.control.mpc import MPCCBF
 from szlib.control.settings import MPCSettings
-from szlib.errors import SolverError
-from szlib.parallel import run_tasks
+from szlib.core.checks import require
+from szlib.core.errors import SolverError
+from szlib.core.parallel import run_tasks
 from szlib.simulation.closed_loop import simulate
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.scenario import Scenario

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from szlib.files import write_file
+from szlib.core.files import write_file
 from szlib.workbook.record import TABLES
 
 

@@ -24,8 +24,8 @@ from scipy.stats import binomtest
 from studies.committed import write_table
 
 import szlib
-from szlib.checks import Array
 from szlib.control.controller import Controller, advance
+from szlib.core.checks import Array
 from szlib.simulation.comparisons import CONTROLLERS
 from szlib.simulation.scenario import Scenario
 

@@ -18,11 +18,11 @@ from studies.committed import write_table
 from studies.rollout_table import interval
 
 import szlib
-from szlib.checks import Array
 from szlib.control.differential_drive import Unicycle
 from szlib.control.obstacles import ellipse_distance
 from szlib.control.settings import TOLERANCE
 from szlib.control.verification import euclidean_to_ellipse, euclidean_to_segment
+from szlib.core.checks import Array
 from szlib.simulation.monte_carlo import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds

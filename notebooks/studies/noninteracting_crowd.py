@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from szlib.core.errors import DataError
 from szlib.encounters.geometry import ATC_SQUARE, Square
-from szlib.errors import DataError
 from szlib.tracks import funnels
 from szlib.tracks.clock import TICKS_PER_SECOND, to_clock
 

@@ -20,11 +20,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest, chi2
 
-from szlib.checks import check_columns
 from szlib.control.mpc import MPCCBF
+from szlib.core.checks import check_columns
+from szlib.core.errors import DataError, ZoneError
 from szlib.encounters.kinds import OPPOSITE
 from szlib.encounters.null_model import NullEncounters
-from szlib.errors import DataError, ZoneError
 from szlib.simulation.closed_loop import simulate
 from szlib.simulation.metrics import compute_metrics
 from szlib.simulation.run import Run

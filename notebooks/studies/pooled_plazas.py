@@ -16,7 +16,7 @@ from studies.committed import write_table
 from tqdm import tqdm
 
 import szlib
-from szlib.errors import ZoneError
+from szlib.core.errors import ZoneError
 from szlib.plaza import accuracy
 from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS
 

@@ -17,7 +17,7 @@ import numpy as np
 from studies.respect import data_and_null
 
 import szlib
-from szlib.files import write_file
+from szlib.core.files import write_file
 from szlib.zones.reference_zones import FILE
 
 SPEED = 1.1

@@ -29,7 +29,7 @@ from studies.committed import write_table
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
-from szlib.parallel import run_tasks
+from szlib.core.parallel import run_tasks
 from szlib.tracks.clock import to_clock
 from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
 from szlib.workbook import figures

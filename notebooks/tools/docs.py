@@ -19,7 +19,7 @@ from pdoc.render import configure, env
 from pdoc.render_helpers import to_html
 
 import szlib
-from szlib.files import claim_folder, write_file
+from szlib.core.files import claim_folder, write_file
 from szlib.workbook.folders import list_notebooks
 from szlib.workbook.report import write_report
 

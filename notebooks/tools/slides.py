@@ -28,7 +28,7 @@ from nbconvert.filters.markdown_mistune import MarkdownWithMath
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
 
-from szlib.files import claim_folder, write_file
+from szlib.core.files import claim_folder, write_file
 from szlib.workbook import folders
 from szlib.workbook.report import MathRenderer
 

@@ -13,8 +13,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, require
-from ..errors import SolverError
+from ..core.checks import Array, require
+from ..core.errors import SolverError
 from .obstacles import Path
 from .people import Person, check_time
 from .settings import MPCSettings

@@ -53,8 +53,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array, check_number, check_point, check_vector
-from ..errors import SolverError
+from ..core.checks import Array, check_array, check_number, check_point, check_vector
+from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from .controller import Controller, StepClock
 from .mpc import MPCCBF

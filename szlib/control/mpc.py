@@ -45,7 +45,7 @@ from warnings import catch_warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import (
+from ..core.checks import (
     Array,
     check_array,
     check_number,
@@ -53,7 +53,7 @@ from ..checks import (
     check_vector,
     require,
 )
-from ..errors import DataWarning, SolverError, warn
+from ..core.errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .controller import Controller, StepClock, find_stopping_path
 from .obstacles import Group, Obstacle, Obstacles, Path, PredictedZone, Wall, Zone

@@ -25,8 +25,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array
-from ..errors import SolverError
+from ..core.checks import Array, check_array
+from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .settings import MPCSettings
 

@@ -29,8 +29,15 @@ from typing import Any, NamedTuple, Protocol, TypeGuard, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import LARGEST, Array, check_array, check_number, check_point, require
-from ..errors import SolverError, ZoneError
+from ..core.checks import (
+    LARGEST,
+    Array,
+    check_array,
+    check_number,
+    check_point,
+    require,
+)
+from ..core.errors import SolverError, ZoneError
 from ..zones.ellipses import Ellipse
 from .settings import MPCSettings
 

@@ -44,7 +44,7 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Array
+from ..core.checks import Array
 from .obstacles import Priority, find_bodies
 from .problem import (
     HARD_PRICE,

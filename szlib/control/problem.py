@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ..checks import Array
+from ..core.checks import Array
 from .obstacles import Group, Obstacle, Obstacles, Priority
 from .settings import MPCSettings
 

@@ -12,8 +12,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..checks import check_array, check_number, require
-from ..errors import SolverError
+from ..core.checks import check_array, check_number, require
+from ..core.errors import SolverError
 
 _require = partial(require, error=SolverError)
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 import shapely
 
-from ..checks import Array
+from ..core.checks import Array
 from ..zones.ellipses import Ellipse
 from .obstacles import Obstacle, Obstacles, Path, Priority, find_bodies
 from .people import Person, TrackedPeople

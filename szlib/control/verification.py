@@ -39,7 +39,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array
+from ..core.checks import Array, check_array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .obstacles import (
     Wall,

@@ -18,9 +18,9 @@ import yaml
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from ..checks import Array, check_array, check_number, require
-from ..errors import DataError, SolverError
-from ..input_files import printable, read_small
+from ..core.checks import Array, check_array, check_number, require
+from ..core.errors import DataError, SolverError
+from ..core.input_files import printable, read_small
 from .obstacles import SHORTEST_WALL, Wall, check_wall
 
 _NUMBERS = {"origin": (3,), "resolution": (), "free_thresh": (), "occupied_thresh": ()}

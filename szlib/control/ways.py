@@ -25,8 +25,8 @@ from scipy.ndimage import binary_dilation
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from ..checks import Array, check_number, check_point, require
-from ..errors import SolverError
+from ..core.checks import Array, check_number, check_point, require
+from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS
 from .obstacles import (
     Group,

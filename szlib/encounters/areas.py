@@ -13,9 +13,9 @@ import shapely
 from scipy.ndimage import distance_transform_edt
 from shapely.geometry.base import BaseGeometry
 
-from ..checks import check_columns
-from ..errors import DataError, warn
-from ..input_files import printable, read_small, reading
+from ..core.checks import check_columns
+from ..core.errors import DataError, warn
+from ..core.input_files import printable, read_small, reading
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, AttentionalSpace, Region, Square

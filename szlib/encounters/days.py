@@ -23,10 +23,10 @@ import joblib
 import pandas as pd
 from tqdm import tqdm
 
-from ..errors import DataError, DataWarning, SzlibError
-from ..files import claim_folder, folder_purpose
-from ..input_files import printable, read_json_object, unchanged_files
-from ..parallel import run_tasks
+from ..core.errors import DataError, DataWarning, SzlibError
+from ..core.files import claim_folder, folder_purpose
+from ..core.input_files import printable, read_json_object, unchanged_files
+from ..core.parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.options import ReadOptions
 from ..tracks.recordings import find_day, name_recordings

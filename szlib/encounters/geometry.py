@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..checks import require
-from ..errors import DataError
+from ..core.checks import require
+from ..core.errors import DataError
 from ..tracks.formats.atc import ATC_AREA
 
 

@@ -27,8 +27,8 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from ..checks import check_columns, check_rows
-from ..errors import DataError
+from ..core.checks import check_columns, check_rows
+from ..core.errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND
 from .areas import as_area

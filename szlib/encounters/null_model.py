@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
-from ..checks import require
-from ..parallel import run_tasks
+from ..core.checks import require
+from ..core.parallel import run_tasks
 from ..tracks import funnels
 from .finding import find_encounters, find_place
 from .kinds import of_kind

@@ -12,9 +12,9 @@ from typing import Any
 import pandas as pd
 
 from .. import __version__
-from ..errors import DataError, DataWarning
-from ..files import load_cached, store_cached
-from ..input_files import file_content, unchanged_files
+from ..core.errors import DataError, DataWarning
+from ..core.files import load_cached, store_cached
+from ..core.input_files import file_content, unchanged_files
 from ..tracks import funnels
 from ..tracks.clock import read_tracks, to_clock
 from ..tracks.formats import find_format

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import check_columns, check_rows
+from ..core.checks import check_columns, check_rows
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, nearest_tick
 from .geometry import wrap_angle
 from .kinds import KINDS

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import require
-from ..errors import DataError
+from ..core.checks import require
+from ..core.errors import DataError
 from ..tracks.clock import TICKS_PER_SECOND
 from .areas import AUTO, as_area
 from .geometry import PAPER_SPACE, AttentionalSpace
@@ -49,7 +49,7 @@ class EncounterSettings:
     >>> szlib.EncounterSettings(duration=0.25)
     Traceback (most recent call last):
     ...
-    szlib.errors.DataError: duration must be a multiple of 0.1 s, the step of the clock; got 0.25
+    szlib.core.errors.DataError: duration must be a multiple of 0.1 s, the step of the clock; got 0.25
     """
 
     area: object = None

@@ -21,8 +21,8 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from ..checks import require
-from ..errors import DataError
+from ..core.checks import require
+from ..core.errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, compute_velocities
 from .geometry import Area

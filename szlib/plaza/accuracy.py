@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import check_columns, check_rows
-from ..errors import DataError
+from ..core.checks import check_columns, check_rows
+from ..core.errors import DataError
 from ..zones.social_zone import SocialZone
 from .generation import FIRST_ID, ID_STEP, stage_encounters
 from .settings import PlazaSettings

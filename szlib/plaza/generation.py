@@ -20,10 +20,10 @@ import pandas as pd
 import polars as pl
 from numpy.typing import NDArray
 
-from ..checks import Array
+from ..core.checks import Array
+from ..core.errors import ZoneError
+from ..core.files import write_file
 from ..encounters.geometry import wrap_angle
-from ..errors import ZoneError
-from ..files import write_file
 from .settings import (
     MARGIN,
     MIN_WALKING_SPEED,

@@ -7,9 +7,9 @@ from datetime import datetime, timedelta, timezone
 
 import numpy as np
 
-from ..checks import Array, require
+from ..core.checks import Array, require
+from ..core.errors import DataError, ZoneError
 from ..encounters.geometry import ATC_SQUARE, AttentionalSpace, Square
-from ..errors import DataError, ZoneError
 from ..zones.ellipses import Ellipse
 from ..zones.outliers import R_MAX
 from ..zones.polar import ellipse_reach

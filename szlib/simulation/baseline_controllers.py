@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import Array
 from ..control.controller import Controller
 from ..control.obstacles import Body, Obstacles
 from ..control.people import Person
 from ..control.settings import MPCSettings
+from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
 from .scenario import Scenario
 

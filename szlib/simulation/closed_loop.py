@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import Array
 from ..control.controller import Controller, as_controller
 from ..control.obstacles import Obstacle
 from ..control.people import Person, SpeedZone, as_ellipse
 from ..control.settings import MPCSettings
-from ..errors import SolverError
+from ..core.checks import Array
+from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .log import SimulationLog
 from .scenario import (

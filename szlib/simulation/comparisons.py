@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import Array
 from ..control.people import as_ellipse
 from ..control.settings import MPCSettings
 from ..control.verification import euclidean_to_ellipse
-from ..errors import SolverError
+from ..core.checks import Array
+from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
 from .baseline_controllers import (

@@ -16,9 +16,9 @@ from .. import __version__
 from ..control.obstacles import describe, number_kinds, restore
 from ..control.people import Person
 from ..control.settings import MPCSettings
-from ..errors import DataError, SzlibError
-from ..files import write_file
-from ..input_files import open_regular, read_small
+from ..core.errors import DataError, SzlibError
+from ..core.files import write_file
+from ..core.input_files import open_regular, read_small
 from ..zones.ellipses import Ellipse
 from .metrics import compute_metrics
 from .run import Run, nanmin

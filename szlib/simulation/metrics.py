@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Array
 from ..control.settings import TOLERANCE
 from ..control.step import STATUSES
+from ..core.checks import Array
 from .outcomes import classify_outcome
 from .run import Run, nanmin
 from .scenario import GOAL_RADIUS, STOPPED_SPEED

@@ -26,9 +26,9 @@ from .. import __version__
 from ..control.controller import Controller
 from ..control.mpc import MPCCBF
 from ..control.settings import MPCSettings
-from ..errors import SolverError, SzlibError
-from ..files import claim_folder, load_cached, store_cached, write_file
-from ..parallel import run_tasks
+from ..core.errors import SolverError, SzlibError
+from ..core.files import claim_folder, load_cached, store_cached, write_file
+from ..core.parallel import run_tasks
 from ..zones.ellipses import Ellipse
 from .closed_loop import ZoneTransform, drive
 from .log import SimulationLog

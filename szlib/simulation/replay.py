@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import Array
 from ..control.controller import Controller
 from ..control.people import Person
 from ..control.settings import MPCSettings
+from ..core.checks import Array
+from ..core.errors import DataError
 from ..encounters.areas import area_for
 from ..encounters.geometry import Area
-from ..errors import DataError
 from ..tracks.clock import TICKS_PER_SECOND, clock_index
 from ..zones.ellipses import Ellipse
 from .crowds.reacting import MIN_HEADING_SPEED

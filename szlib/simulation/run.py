@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Array
 from ..control.obstacles import Obstacles, barrier, ellipse_distance
 from ..control.people import Person
 from ..control.settings import MPCSettings
-from ..errors import DataError
+from ..core.checks import Array
+from ..core.errors import DataError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import Array
 from ..control.obstacles import barrier, ellipse_distance
 from ..control.settings import TOLERANCE
+from ..core.checks import Array
 from ..encounters.geometry import wrap_angle
 from .run import Run
 

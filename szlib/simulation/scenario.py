@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..checks import Array, check_array, require
 from ..control.obstacles import Obstacle, Wall, check_wall
 from ..control.people import Person
-from ..errors import SolverError
+from ..core.checks import Array, check_array, require
+from ..core.errors import SolverError
 
 GOAL_RADIUS = 0.1  # the robot has arrived within this distance of the goal [m], when it has stopped (assumed)
 # Below this speed the robot stands; below this progress to the goal it yields [m/s] (assumed).

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Array
 from ..control.obstacles import ellipse_distance
+from ..core.checks import Array
 from ..encounters.geometry import wrap_angle
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .metrics import measure_path_length

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .. import memory
-from ..checks import check_columns, check_rows, require
-from ..errors import DataError
+from ..core import memory
+from ..core.checks import check_columns, check_rows, require
+from ..core.errors import DataError
 from . import funnels
 from .options import SHORTEST_GAP, ReadOptions
 from .readers import is_sorted, read_raw

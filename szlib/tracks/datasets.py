@@ -19,8 +19,8 @@ from pathlib import Path
 
 import pooch
 
-from ..errors import DataError, warn
-from ..input_files import printable
+from ..core.errors import DataError, warn
+from ..core.input_files import printable
 
 SYNTHETIC = "synthetic"
 # A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network.

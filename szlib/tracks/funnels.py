@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ..errors import SzlibError
+from ..core.errors import SzlibError
 
 KEY = "funnel"
 WARNING = "warning: "  # how the name of a stage begins that rejects nothing, but says what is implausible

@@ -25,9 +25,9 @@ import numpy as np
 import pandas as pd
 from scipy.cluster.hierarchy import DisjointSet
 
-from ..checks import check_rows
-from ..errors import DataError, warn
-from ..input_files import read_small, reading
+from ..core.checks import check_rows
+from ..core.errors import DataError, warn
+from ..core.input_files import read_small, reading
 from . import funnels
 from .clock import (
     COLUMNS,
@@ -64,7 +64,7 @@ def check_tracks(tracks: pd.DataFrame) -> None:
     >>> check_tracks(to_clock(raw).iloc[::-1])
     Traceback (most recent call last):
     ...
-    szlib.errors.DataError: row 4: got {...}; this row is out of order; expected rows sorted by day, id, t
+    szlib.core.errors.DataError: row 4: got {...}; this row is out of order; ...
     """
     order = clock_index(tracks)[0]
     expected = "this row is out of order; expected rows sorted by day, id, t"

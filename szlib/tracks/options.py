@@ -11,8 +11,8 @@ from zoneinfo import ZoneInfo
 
 import polars as pl
 
-from ..checks import require
-from ..errors import DataError
+from ..core.checks import require
+from ..core.errors import DataError
 
 # Which column holds t [s] or frame, id, x, y and day: its name, or the number of the field from 0.
 Columns = Mapping[str, str | int]
@@ -74,7 +74,7 @@ class ReadOptions:
     >>> szlib.ReadOptions(unit="feet")
     Traceback (most recent call last):
     ...
-    szlib.errors.DataError: unit must be one of ['m', 'cm', 'mm', 'ft']; got 'feet'
+    szlib.core.errors.DataError: unit must be one of ['m', 'cm', 'mm', 'ft']; got 'feet'
     """
 
     file_format: str | None = None

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from ..errors import DataError, warn
+from ..core.errors import DataError, warn
 from .formats import TrackFormat
 from .motion import FASTEST, MAX_SITE, REGULAR, find_walking, measure_motion
 from .options import FRAMES, UNITS, advise

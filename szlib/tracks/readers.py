@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from ..errors import DataError, warn
-from ..input_files import printable
+from ..core.errors import DataError, warn
+from ..core.input_files import printable
 from . import funnels
 from .formats import TrackFormat, open_file
 from .formats.base import EXPECTED, MISSING

@@ -10,8 +10,8 @@ from zoneinfo import ZoneInfo
 
 import polars as pl
 
-from ..errors import DataError, warn
-from ..input_files import printable
+from ..core.errors import DataError, warn
+from ..core.input_files import printable
 from .formats import TrackFormat, find_format
 from .formats.base import CALENDAR_BEGINS, decode_line, file_stem
 from .formats.unpack import read_first_line

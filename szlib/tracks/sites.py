@@ -26,8 +26,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..errors import DataError
-from ..input_files import read_small, reading
+from ..core.errors import DataError
+from ..core.input_files import read_small, reading
 from . import funnels
 from .clock import read_tracks, to_clock
 from .formats.parsed import read_magni_rows

@@ -32,9 +32,10 @@ from typing import Any
 
 import psutil
 
-from .. import __version__, memory
-from ..errors import DataError, DataWarning, SzlibError
-from ..input_files import printable
+from .. import __version__
+from ..core import memory
+from ..core.errors import DataError, DataWarning, SzlibError
+from ..core.input_files import printable
 
 # Packages of the extra `workbook`, which the commands `run` and `report` need.
 _WORKBOOK_PACKAGES = (
@@ -201,7 +202,7 @@ def _run(options: argparse.Namespace) -> int:
     if reading := _read_options(options):
         parameters["reading"] = reading
     _require_workbook_packages()
-    from ..parallel import cluster
+    from ..core.parallel import cluster
     from .machine_summaries import append_markdown, require_junit, write_junit
     from .runner import format_summary, list_results, run
 
@@ -336,8 +337,8 @@ def _inspect(options: argparse.Namespace) -> int:
 
 def _extract(options: argparse.Namespace) -> int:
     """Extract the encounters of many days, and print the table of days."""
+    from ..core.parallel import cluster
     from ..encounters.days import extract_days
-    from ..parallel import cluster
     from ..tracks.options import ReadOptions
 
     with cluster(options.scheduler, wait=options.wait):

@@ -9,6 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..control.settings import MPCSettings
+from ..core.errors import DataError, DataWarning, StorageError, ZoneError
+from ..core.files import folder_purpose, write_file
+from ..core.input_files import file_content, printable, read_json_object
 from ..encounters.areas import AUTO
 from ..encounters.days import PURPOSE, Extraction
 from ..encounters.finding import find_encounters
@@ -20,9 +23,6 @@ from ..encounters.one_day import (
     require_encounters,
 )
 from ..encounters.settings import EncounterSettings
-from ..errors import DataError, DataWarning, StorageError, ZoneError
-from ..files import folder_purpose, write_file
-from ..input_files import file_content, printable, read_json_object
 from ..tracks import datasets
 from ..tracks.clock import read_tracks
 from ..tracks.options import ReadOptions

@@ -19,9 +19,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..errors import DataError, StorageError
-from ..files import claim_folder, folder_purpose
-from ..input_files import printable
+from ..core.errors import DataError, StorageError
+from ..core.files import claim_folder, folder_purpose
+from ..core.input_files import printable
 from ..tracks import datasets
 
 # The folder of the notebooks: in an installed package, or beside the package in the repository.

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..input_files import open_regular
+from ..core.input_files import open_regular
 from . import folders
 
 # Notebooks whose results later ones need, the encounters and the zone, and the file of each.

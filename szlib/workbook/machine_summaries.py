@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import StorageError, warn
-from ..files import write_file
-from ..input_files import printable, read_small
+from ..core.errors import StorageError, warn
+from ..core.files import write_file
+from ..core.input_files import printable, read_small
 from .folders import require_place
 from .record.display import format_value
 

@@ -14,9 +14,9 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from ..errors import SzlibError
-from ..files import temporary_folder, write_file
-from ..input_files import printable, read_json_object
+from ..core.errors import SzlibError
+from ..core.files import temporary_folder, write_file
+from ..core.input_files import printable, read_json_object
 from .record.data_cache import describe_missing_data
 from .record.parameters import METHOD_DEFAULTS, read_defaults
 

@@ -29,9 +29,9 @@ from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
-from ..errors import DataError, SzlibError
-from ..files import MARKER, folder_purpose, write_file
-from ..input_files import open_regular, printable, read_json_object, read_small
+from ..core.errors import DataError, SzlibError
+from ..core.files import MARKER, folder_purpose, write_file
+from ..core.input_files import open_regular, printable, read_json_object, read_small
 from ..plaza.settings import PlazaSettings
 from ..simulation.scenarios.paper import SCENARIOS
 from ..tracks import datasets, funnels

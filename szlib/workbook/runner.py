@@ -26,11 +26,18 @@ from typing import Any
 import pandas as pd
 from tqdm import tqdm
 
-from .. import __version__, memory
-from ..errors import DataError, SzlibError
-from ..files import folder_lock, load_cached, process_folder, write_checksum, write_file
-from ..input_files import file_content, read_json_object
-from ..parallel import limit_jobs, safe_path, uninterrupted
+from .. import __version__
+from ..core import memory
+from ..core.errors import DataError, SzlibError
+from ..core.files import (
+    folder_lock,
+    load_cached,
+    process_folder,
+    write_checksum,
+    write_file,
+)
+from ..core.input_files import file_content, read_json_object
+from ..core.parallel import limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
 from . import folders
 from .kept_results import (
@@ -77,7 +84,7 @@ def run(
     jobs : number of notebooks that run at the same time.
     only : numbers ("07") or names of the notebooks; empty: all.
     parameters : parameters of the notebooks by name, such as {"seed": 1}.
-    client : of a Dask cluster that shares this file system, as from `szlib.parallel.cluster`.
+    client : of a Dask cluster that shares this file system, as from `szlib.core.parallel.cluster`.
     notebooks : the folder of the notebooks; None as for `folders.find_notebooks`.
     figures : a format in which figures are saved besides PNG, "svg" or "pdf".
     force : whether to repeat notebooks whose stored results are of the same notebook, code, data, parameters.

@@ -19,8 +19,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import Array
-from ..errors import ZoneError
+from ..core.checks import Array
+from ..core.errors import ZoneError
 from .ellipses import BODY_RADIUS, Ellipse, circle_around
 
 FADE = 0.5  # distance from a zone at which its cost reaches 0 [m] (assumed)

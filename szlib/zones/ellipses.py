@@ -15,8 +15,8 @@ from math import cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array
-from ..errors import ZoneError
+from ..core.checks import Array
+from ..core.errors import ZoneError
 
 BODY_RADIUS = 0.25
 """Radius of a person's body: half the breadth of the shoulders [m] (assumed)."""

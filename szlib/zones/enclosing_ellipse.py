@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import Array
-from ..errors import ZoneError
+from ..core.checks import Array
+from ..core.errors import ZoneError
 from .ellipses import Ellipse
 
 # a closed curve: angles (n,) [rad] to points (n, 2) [m]

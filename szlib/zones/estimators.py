@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import Array
+from ..core.checks import Array
 from .ellipses import Ellipse
 
 

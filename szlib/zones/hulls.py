@@ -21,8 +21,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from ..checks import Array
-from ..errors import ZoneError
+from ..core.checks import Array
+from ..core.errors import ZoneError
 from ..tracks import funnels
 from .ellipses import Ellipse, unit_vectors
 from .enclosing_ellipse import (

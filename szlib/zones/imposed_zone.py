@@ -19,13 +19,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, check_columns, require
+from ..core.checks import Array, check_columns, require
+from ..core.errors import ZoneError
 from ..encounters.finding import find_encounters
 from ..encounters.kinds import WALKING
 from ..encounters.samples import SAMPLE_COLUMNS
 from ..encounters.settings import EncounterSettings
 from ..encounters.time_shift import time_shifted
-from ..errors import ZoneError
 from ..tracks import funnels
 from .ellipses import Ellipse
 from .outliers import pair_numbers

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from scipy.ndimage import gaussian_filter
 
-from ..checks import Array, check_columns
+from ..core.checks import Array, check_columns
+from ..core.errors import ZoneError
 from ..encounters.null_model import NullEncounters
-from ..errors import ZoneError
 
 _N_DISTANCES, _N_DIRECTIONS = 80, 36
 # standard deviations of the Gaussians that smooth the map of g [deg, m]

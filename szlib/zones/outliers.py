@@ -18,8 +18,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, check_columns, check_rows, require
-from ..errors import DataError, warn
+from ..core.checks import Array, check_columns, check_rows, require
+from ..core.errors import DataError, warn
 from ..tracks import funnels
 from .ellipses import unit_vectors
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array
-from ..errors import ZoneError
+from ..core.checks import Array
+from ..core.errors import ZoneError
 from .ellipses import Ellipse, unit_vectors
 
 # Directions of the radii, counter-clockwise from ahead [rad].

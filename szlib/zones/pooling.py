@@ -23,7 +23,7 @@ import pandas as pd
 from scipy.optimize import brentq
 from scipy.stats import norm, t
 
-from ..errors import ZoneError
+from ..core.errors import ZoneError
 from .social_zone import SocialZone
 
 POSITIVE = ("radius", "a", "b", "area")  # pooled as logarithms

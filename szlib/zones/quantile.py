@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, check_columns, check_rows, require
-from ..errors import ZoneError
+from ..core.checks import Array, check_columns, check_rows, require
+from ..core.errors import ZoneError
 from ..tracks import funnels
 from .estimators import Estimator
 from .outliers import encounter_numbers, is_close

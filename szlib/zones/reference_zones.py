@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..checks import require
-from ..errors import ZoneError
+from ..core.checks import require
+from ..core.errors import ZoneError
 from .ellipses import Ellipse
 from .verdict import Verdict
 

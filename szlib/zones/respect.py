@@ -39,9 +39,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array
+from ..core.checks import Array
+from ..core.errors import ZoneError
 from ..encounters.null_model import NullEncounters
-from ..errors import ZoneError
 from ..tracks import funnels
 from .estimators import Estimator
 from .polar import DIRECTIONS, PolarZone, ellipse_reach

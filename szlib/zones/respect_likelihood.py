@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from scipy.special import expit
 from threadpoolctl import ThreadpoolController
 
-from ..checks import Array, check_columns, check_rows
+from ..core.checks import Array, check_columns, check_rows
 from ..encounters.kinds import WALKING
 from .outliers import encounter_numbers
 from .quantile import smooth_paths

@@ -32,9 +32,9 @@ from numpy.typing import NDArray
 from scipy.special import expit
 from scipy.stats import chi2
 
-from ..checks import Array, check_columns
+from ..core.checks import Array, check_columns
+from ..core.errors import ZoneError
 from ..encounters.null_model import NullEncounters
-from ..errors import ZoneError
 from .outliers import nearest_approaches
 
 # Softness of the edge w [m].  Its standard deviation is 1.8 w, at least 6 cm: a sharper edge follows single

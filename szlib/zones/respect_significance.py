@@ -29,9 +29,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..core.errors import DataError, ZoneError, warn
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
-from ..errors import DataError, ZoneError, warn
 from .estimators import Estimator
 from .respect_profile import Approaches, RespectRadius, fit_radius
 

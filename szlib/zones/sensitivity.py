@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..core.errors import DataError, DataWarning, ZoneError
 from ..encounters.finding import find_encounters
 from ..encounters.geometry import Area
 from ..encounters.near_rows import select_near_rows
-from ..errors import DataError, DataWarning, ZoneError
 from .outliers import FRACTION, N_NEIGHBOURS
 from .social_zone import SocialZone
 

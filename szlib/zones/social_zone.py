@@ -23,9 +23,9 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
-from ..checks import Array, check_columns, require
+from ..core.checks import Array, check_columns, require
+from ..core.errors import ZoneError, warn
 from ..encounters.null_model import NullEncounters
-from ..errors import ZoneError, warn
 from .ellipses import Ellipse
 from .estimators import Estimator, ZoneShape
 from .hulls import HullEstimator, HullZone

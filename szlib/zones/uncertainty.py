@@ -34,7 +34,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ..checks import Array, require
+from ..core.checks import Array, require
 from .estimators import Estimator
 from .outliers import encounter_numbers, pair_numbers
 from .polar import DIRECTIONS, ellipse_reach

@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
-from ..errors import SzlibError, ZoneError
-from ..files import write_file
-from ..input_files import read_small, reading
+from ..core.errors import SzlibError, ZoneError
+from ..core.files import write_file
+from ..core.input_files import read_small, reading
 from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone

@@ -29,8 +29,8 @@ from benchmarks import data_growth, data_sizes, measuring, steps
 from helpers.random_states import meetings, questions
 
 import szlib
-from szlib.checks import Array
 from szlib.control import problem
+from szlib.core.checks import Array
 from szlib.plaza.generation import make_plaza
 from szlib.tracks import datasets
 

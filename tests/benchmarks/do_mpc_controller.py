@@ -7,8 +7,8 @@ import do_mpc
 import numpy as np
 
 import szlib
-from szlib.checks import Array
 from szlib.control.obstacles import Zone, barrier, cbf_residual, ellipse_formula
+from szlib.core.checks import Array
 
 
 def do_mpc_step(

@@ -21,8 +21,8 @@ from benchmarks import measuring
 from helpers.random_states import ZONE
 
 import szlib
-from szlib.checks import Array
 from szlib.control.controller import advance
+from szlib.core.checks import Array
 
 BEFORE_VARIABLE = "SZLIB_BEFORE"
 GOAL = (8.0, 0.5)

@@ -10,7 +10,7 @@ from helpers.hostile_results import make_hostile_results
 from laboratory import Laboratory
 
 import szlib
-from szlib.files import claim_folder
+from szlib.core.files import claim_folder
 from szlib.workbook.report import write_report
 
 MINUTES = 60_000

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.files import claim_folder
+from szlib.core.files import claim_folder
 from szlib.workbook.report import write_report
 
 VERDICT = "undecided: no null model"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.checks import Array
 from szlib.control import HalfPlane, Obstacles, Wall, advance, euclidean_to_segment, mpc
+from szlib.core.checks import Array
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 S = szlib.MPCSettings(time_limit=np.inf)

@@ -15,7 +15,7 @@ from szlib.zones.polar import DIRECTIONS, PolarZone
 ZONE = szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)
 GOAL = (5.0, 0.5)
 # a zone of nobody's data
-pytestmark = pytest.mark.filterwarnings("ignore::szlib.errors.DataWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::szlib.core.errors.DataWarning")
 
 
 CLASSES = {"ros2_node": "SocialDrive", "ros2_node_full": "FullSocialDrive"}

@@ -13,7 +13,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 import szlib
-from szlib.checks import Array
 from szlib.control import HalfPlane, Obstacles, Wall, Zone, find_route
 from szlib.control.ways import (
     CELL,
@@ -29,6 +28,7 @@ from szlib.control.ways import (
     _Stamps,
     find_target,
 )
+from szlib.core.checks import Array
 
 AHEAD = szlib.MPCSettings(lookahead=4.0, time_limit=np.inf)
 PLAIN = szlib.MPCSettings(time_limit=np.inf)

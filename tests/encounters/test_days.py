@@ -23,9 +23,9 @@ import pytest
 from helpers.faulty_disk import FaultyDisk
 
 import szlib
+from szlib.core.files import claim_folder
 from szlib.encounters import days as extraction
 from szlib.encounters import one_day
-from szlib.files import claim_folder
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels

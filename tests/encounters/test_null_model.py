@@ -11,7 +11,7 @@ from helpers.track_tables import make_tracks, make_walk
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
-from szlib.errors import DataError
+from szlib.core.errors import DataError
 from szlib.tracks import funnels
 
 ASKED = {"minutes": (1.0, 5.0), "min_distance": 0.5}

@@ -9,8 +9,8 @@ from helpers.track_tables import DAY, make_tracks, make_walk
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
+from szlib.core.errors import DataError
 from szlib.encounters.time_shift import COMPANION_SEPARATION, ShiftableTracks
-from szlib.errors import DataError
 from szlib.tracks import funnels
 from szlib.tracks.clock import nearest_tick
 from szlib.tracks.interop import check_tracks

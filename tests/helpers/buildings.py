@@ -16,8 +16,8 @@ import numpy as np
 import shapely
 from scipy.ndimage import distance_transform_edt, gaussian_filter, label
 
-from szlib.checks import Array
 from szlib.control import walls_from_grid
+from szlib.core.checks import Array
 
 WIDTH, HEIGHT = 40.0, 30.0
 """Of the building [m]."""

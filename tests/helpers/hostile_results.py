@@ -9,7 +9,7 @@ from pathlib import Path
 import nbformat
 import pandas as pd
 
-from szlib.files import claim_folder
+from szlib.core.files import claim_folder
 
 BAD = (
     '"><img src=x onerror=attack()><script>attack()</script><svg onload=attack()>'

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import szlib
-from szlib.checks import Array
+from szlib.core.checks import Array
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from szlib.checks import Array
-from szlib.errors import SolverError
+from szlib.core.checks import Array
+from szlib.core.errors import SolverError
 from szlib.simulation.crowds.walking_model import Walkers, import_package
 
 INSTALL_JUPEDSIM = "pip install --no-deps jupedsim deprecated wrapt"

@@ -24,8 +24,8 @@ from pathlib import Path
 from unittest import mock
 
 import szlib
-from szlib.errors import SzlibError
-from szlib.input_files import file_content
+from szlib.core.errors import SzlibError
+from szlib.core.input_files import file_content
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.workbook.record.data_cache import DataCache

@@ -11,7 +11,7 @@ from typing import ClassVar
 import pytest
 
 import szlib
-from szlib.errors import DataError
+from szlib.core.errors import DataError
 from szlib.tracks import datasets, quality
 
 

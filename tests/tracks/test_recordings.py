@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import szlib
-from szlib import memory
-from szlib.errors import MemoryLimitError, StorageError
+from szlib.core import memory
+from szlib.core.errors import MemoryLimitError, StorageError
 from szlib.tracks import datasets
 from szlib.tracks.formats import unpack
 from szlib.tracks.readers import read_raw

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib.files import claim_folder, store_cached
+from szlib.core.files import claim_folder, store_cached
 from szlib.workbook import folders, runner
 from szlib.workbook.cli import main
 
@@ -135,7 +135,7 @@ def test_a_folder_is_locked_until_the_process_that_writes_there_ends(
 ):
     run()
     program = f"""
-from szlib.files import folder_lock
+from szlib.core.files import folder_lock
 with folder_lock({str(tmp_path / "out" / "mine")!r}):
     print("locked", flush=True)
     input()

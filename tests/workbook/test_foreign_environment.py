@@ -14,7 +14,7 @@ import nbformat
 import pytest
 
 import szlib
-from szlib import files
+from szlib.core import files
 from szlib.workbook import cli, report, runner
 from szlib.workbook.cli import main
 

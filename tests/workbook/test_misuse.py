@@ -17,8 +17,8 @@ import pytest
 from helpers.faulty_disk import FaultyDisk
 
 import szlib
+from szlib.core.errors import DataError, StorageError
 from szlib.encounters import days
-from szlib.errors import DataError, StorageError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import datasets
@@ -209,7 +209,7 @@ def test_entry_that_blocks_results_is_named(notebooks, tmp_path, capsys, garbage
 def test_notebook_without_disk_space_is_refused_with_exit_code_2(
     notebooks, tmp_path, capsys
 ):
-    full = 'from szlib.errors import StorageError\nraise StorageError("no room")'
+    full = 'from szlib.core.errors import StorageError\nraise StorageError("no room")'
     notebooks(_00_fine='record.check("ok", True)', _01_full=full, _06_later="")
     assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
     printed = capsys.readouterr()

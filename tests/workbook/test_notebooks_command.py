@@ -12,7 +12,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from szlib.errors import DataError
+from szlib.core.errors import DataError
 from szlib.workbook import folders
 from szlib.workbook.cli import main
 

@@ -10,7 +10,7 @@ import pytest
 from studies import committed
 
 import szlib
-from szlib.input_files import file_content
+from szlib.core.input_files import file_content
 from szlib.workbook import folders
 from szlib.workbook.record import (
     DataCache,

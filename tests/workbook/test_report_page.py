@@ -10,8 +10,8 @@ import pytest
 from bs4 import BeautifulSoup
 
 import szlib
-from szlib.errors import DataError
-from szlib.files import claim_folder
+from szlib.core.errors import DataError
+from szlib.core.files import claim_folder
 from szlib.workbook.cli import main
 from szlib.workbook.folders import NOTEBOOKS
 from szlib.workbook.paper_sentences import load_sentences

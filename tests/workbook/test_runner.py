@@ -8,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from szlib.errors import DataError
-from szlib.files import write_checksum
+from szlib.core.errors import DataError
+from szlib.core.files import write_checksum
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.workbook import cli, notebook_execution, runner
@@ -128,7 +128,9 @@ def test_too_few_encounters_for_a_zone_end_in_a_verdict(
 
 
 @pytest.mark.usefixtures("without_kernels")
-@pytest.mark.parametrize("raised", ["szlib.errors.ZoneError", "szlib.errors.DataError"])
+@pytest.mark.parametrize(
+    "raised", ["szlib.core.errors.ZoneError", "szlib.core.errors.DataError"]
+)
 def test_errors_of_other_causes_are_not_undecided(notebooks, tmp_path, raised, capsys):
     """An error about the data, and one about a zone where no encounters were stored, refuse the notebook."""
     make = "import szlib\n" + (

@@ -10,8 +10,8 @@ import pytest
 from bs4 import BeautifulSoup
 from helpers.hostile_results import make_hostile_results
 
-from szlib.errors import DataError, SzlibError
-from szlib.files import claim_folder
+from szlib.core.errors import DataError, SzlibError
+from szlib.core.files import claim_folder
 from szlib.workbook.report import write_report
 
 HARMLESS = ("#", "http://", "https://", "mailto:")

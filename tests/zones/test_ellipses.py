@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mpmath import MPContext
 from scipy.optimize import minimize, nnls
 
-from szlib.errors import SzlibError, ZoneError
+from szlib.core.errors import SzlibError, ZoneError
 from szlib.zones.ellipses import Ellipse, circle_around
 from szlib.zones.enclosing_ellipse import (
     minimum_enclosing_ellipse,

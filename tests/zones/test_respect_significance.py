@@ -10,7 +10,7 @@ import pytest
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
-from szlib.errors import DataError, DataWarning, ZoneError
+from szlib.core.errors import DataError, DataWarning, ZoneError
 from szlib.zones.respect_significance import null_test
 
 KINDS = ("opposite", "crossing")

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from szlib.checks import Array
 from szlib.control.mpc import MPCCBF
 from szlib.control.settings import MPCSettings
+from szlib.core.checks import Array
 from szlib.simulation.closed_loop import simulate
 from szlib.simulation.metrics import find_avoidance_start
 from szlib.simulation.scenarios.paper import SCENARIOS

@@ -6,7 +6,7 @@ import secrets
 from importlib import import_module
 from typing import Any
 
-from szlib.errors import DataError
+from szlib.core.errors import DataError
 
 from .task import ESSAY_MINUTES, Answer, Args, Task, Verdict
 

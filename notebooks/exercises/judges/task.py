@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from szlib.errors import SzlibError
+from szlib.core.errors import SzlibError
 
 from .qp import Infeasible
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Array
+from ...core.checks import Array
 from ...zones.ellipses import BODY_RADIUS
 from .walking_model import INSTALL_CROWDS, MAX_SPEED_FACTOR, Walkers, import_package
 

@@ -9,10 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ...checks import Array, check_array, require
 from ...control.people import Person
 from ...control.settings import MPCSettings
-from ...errors import SolverError
+from ...core.checks import Array, check_array, require
+from ...core.errors import SolverError
 from ...zones.ellipses import BODY_RADIUS
 from ..scenario import Crowd, CrowdModel, Scenario
 from .orca import OrcaModel

@@ -13,8 +13,8 @@ from types import ModuleType
 
 import numpy as np
 
-from ...checks import Array
-from ...errors import SolverError
+from ...core.checks import Array
+from ...core.errors import SolverError
 from .walking_model import INSTALL_CROWDS, Walkers, import_package
 
 # A shorter wall counts as one of this length, because walls are points at 0.1 m from each other [m].

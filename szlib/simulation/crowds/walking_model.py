@@ -8,8 +8,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import Protocol
 
-from ...checks import Array
-from ...errors import SolverError
+from ...core.checks import Array
+from ...core.errors import SolverError
 
 # Largest speed of people who avoid others, as a multiple of their own (Helbing and Molnar 1995).
 MAX_SPEED_FACTOR = 1.3

@@ -21,8 +21,8 @@ from math import cos, pi, sin
 import numpy as np
 import shapely
 
-from ...checks import Array
 from ...control.people import Person
+from ...core.checks import Array
 from ...zones.ellipses import Ellipse
 from ..scenario import UNAFFECTED, Crowd, Scenario
 

@@ -10,12 +10,12 @@ from math import cos, dist, pi, sin
 
 import numpy as np
 
-from ...checks import Array, require
 from ...control.obstacles import Obstacles, Wall, Zone, euclidean_segment_formula
 from ...control.people import Person
 from ...control.settings import MPCSettings
 from ...control.verification import required_margin
-from ...errors import SolverError
+from ...core.checks import Array, require
+from ...core.errors import SolverError
 from ...zones.ellipses import BODY_RADIUS, Ellipse
 from ..scenario import Scenario
 

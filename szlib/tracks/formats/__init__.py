@@ -18,7 +18,7 @@ from pathlib import Path
 
 import polars as pl
 
-from ...errors import DataError
+from ...core.errors import DataError
 from ..options import ReadOptions
 from .atc import ATC_1HZ, ATC_RAW
 from .base import EXPECTED, TrackFormat

@@ -16,7 +16,7 @@ from zoneinfo import ZoneInfo
 
 import polars as pl
 
-from ...errors import DataError
+from ...core.errors import DataError
 from ..options import ReadOptions
 from .unpack import LONGEST_LINE
 

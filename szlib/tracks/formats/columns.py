@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 import polars as pl
 
-from ...errors import DataError
+from ...core.errors import DataError
 from ..motion import find_walking
 from ..options import FRAMES, UNITS, ReadOptions, advise
 from .base import TrackFormat

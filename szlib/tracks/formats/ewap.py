@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 import polars as pl
 
-from ...errors import DataError, warn
+from ...core.errors import DataError, warn
 from ..options import FRAME_RATES, ReadOptions
 from .base import TrackFormat, decode_first_line
 

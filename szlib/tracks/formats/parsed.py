@@ -19,9 +19,9 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from ...checks import check_columns
-from ...errors import DataError, SzlibError
-from ...input_files import reading
+from ...core.checks import check_columns
+from ...core.errors import DataError, SzlibError
+from ...core.input_files import reading
 from ..options import ReadOptions, advise
 from .base import Opened, TrackFormat, scan_table
 from .tidy import open_database

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ... import memory
-from ...errors import DataError, StorageError
-from ...files import temporary_folder
-from ...input_files import printable, readable_path, unchanged_files
+from ...core import memory
+from ...core.errors import DataError, StorageError
+from ...core.files import temporary_folder
+from ...core.input_files import printable, readable_path, unchanged_files
 
 LONGEST_LINE = 100_000
 # Bytes that a row takes while its file is read as a whole (measured: 100 at 1 Hz, 126 tidy).

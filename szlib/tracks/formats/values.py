@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 import polars as pl
 
-from ...errors import DataError
+from ...core.errors import DataError
 
 # Times without a unit that are larger than this are counts since 1970, in units of so many seconds: as
 # seconds they would be later than the year 5000.

@@ -15,7 +15,6 @@ from matplotlib.patches import Circle, Rectangle
 from numpy.typing import ArrayLike
 from shapely.plotting import patch_from_polygon
 
-from ...checks import Array
 from ...control.obstacles import (
     Obstacle,
     Wall,
@@ -30,6 +29,7 @@ from ...control.verification import (
     find_safe_boundary,
     required_margin,
 )
+from ...core.checks import Array
 from ...zones.ellipses import Ellipse
 from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from .style import add_legend_below, draw_person, get_axes, label_metres

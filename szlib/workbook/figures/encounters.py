@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from PIL import Image
 
+from ...core.errors import DataError
 from ...encounters.geometry import Area, AttentionalSpace
-from ...errors import DataError
 from ...zones.ellipses import Ellipse
 from .palette import BLACK, BLUE, GREY, ORANGE, RED, SEQUENCE
 from .style import add_legend_below, area_patch, draw_person, get_axes, label_metres

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Array
 from ...control.settings import MPCSettings
+from ...core.checks import Array
 from ...simulation.run import Run
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse

@@ -18,7 +18,7 @@ from matplotlib.patches import Ellipse as EllipsePatch
 from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
-from ...checks import Array
+from ...core.checks import Array
 from ...simulation.replay import Replay
 from ...simulation.run import Run, nanmin
 from ...simulation.scenario import Scenario

@@ -17,7 +17,7 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import ConvexHull
 
-from ...errors import DataWarning, ZoneError
+from ...core.errors import DataWarning, ZoneError
 from ...zones.ellipses import Ellipse
 from ...zones.hulls import HullZone
 from ...zones.occupancy import PairCorrelation

@@ -13,15 +13,15 @@ from typing import Any
 import pandas as pd
 
 from ... import __version__
+from ...core.errors import DataError, ZoneError
+from ...core.files import load_cached, store_cached, write_checksum
+from ...core.input_files import file_content, printable, unchanged_files
 from ...encounters import one_day
 from ...encounters.areas import as_area, place_apart
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
 from ...encounters.null_model import NullEncounters, null_encounters
 from ...encounters.settings import EncounterSettings
-from ...errors import DataError, ZoneError
-from ...files import load_cached, store_cached, write_checksum
-from ...input_files import file_content, printable, unchanged_files
 from ...plaza.generation import make_plaza
 from ...plaza.settings import PlazaSettings
 from ...tracks import datasets

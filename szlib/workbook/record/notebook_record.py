@@ -18,8 +18,8 @@ import numpy as np
 import pandas as pd
 from pandas.io.formats.style import Styler
 
-from ...files import claim_folder, write_file
-from ...input_files import read_json_object
+from ...core.files import claim_folder, write_file
+from ...core.input_files import read_json_object
 from .. import folders
 from .committed_tables import find_differences, read_table
 from .data_cache import DataCache

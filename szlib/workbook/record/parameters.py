@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from ...control.settings import MPCSettings
+from ...core.errors import DataError, SolverError
+from ...core.input_files import printable
 from ...encounters.areas import AUTO, as_area
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.settings import EncounterSettings
-from ...errors import DataError, SolverError
-from ...input_files import printable
 from ...tracks.options import ReadOptions
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE

@@ -12,7 +12,7 @@ import pytest
 
 PROGRAM = """
 import time, joblib
-from szlib.parallel import run_tasks
+from szlib.core.parallel import run_tasks
 if __name__ == "__main__":
     print("begun", flush=True)
     list(run_tasks([joblib.delayed(time.sleep)(60)] * 2, n_jobs=2))
@@ -23,7 +23,7 @@ if __name__ == "__main__":
 def test_a_worker_whose_parent_ended_before_it_was_up_ends_as_well(
     parent: str, code: int
 ) -> None:
-    program = f"import os; from szlib.parallel import end_with; end_with({parent})"
+    program = f"import os; from szlib.core.parallel import end_with; end_with({parent})"
     assert subprocess.run([sys.executable, "-c", program]).returncode == code
 
 
@@ -113,7 +113,9 @@ def test_the_next_run_removes_the_semaphores_of_a_group_that_was_killed(
     assert wait_until(semaphores)
     os.killpg(parent.pid, signal.SIGKILL)
     parent.wait()
-    remove = "from szlib.files import remove_abandoned_temporary as remove; remove()"
+    remove = (
+        "from szlib.core.files import remove_abandoned_temporary as remove; remove()"
+    )
     subprocess.run([sys.executable, "-c", remove], env=place, check=True)
     assert not semaphores()
 

@@ -17,8 +17,8 @@ import nbformat
 import pytest
 
 import szlib
-from szlib import files, input_files, memory
-from szlib.errors import MemoryLimitError, StorageError
+from szlib.core import files, input_files, memory
+from szlib.core.errors import MemoryLimitError, StorageError
 from szlib.simulation.log import SimulationLog
 from szlib.tracks.interop import read_groups
 from szlib.workbook.report import write_report
@@ -45,7 +45,7 @@ def test_only_files_py_writes_files() -> None:
     unpacked = [each for each in found if each.endswith("unpacked.open('wb')")]
     appended = [each for each in found if "Path(file).open('a'" in each]
     assert [each for each in found if each not in unpacked + appended] == [
-        "files.py: unfinished.open('xb')"
+        "core/files.py: unfinished.open('xb')"
     ]
     assert len(unpacked) == 1, "a compressed file is unpacked into a temporary folder"
     assert len(appended) == 1, (
@@ -115,9 +115,7 @@ def test_a_folder_with_foreign_files_other_results_or_input_data_is_refused(
 
 def test_one_process_at_a_time_holds_the_lock_of_a_folder(tmp_path: Path) -> None:
     folder = files.claim_folder(tmp_path / "results", "results")
-    program = (
-        f"from szlib.files import folder_lock\nwith folder_lock({str(folder)!r}): pass"
-    )
+    program = f"from szlib.core.files import folder_lock\nwith folder_lock({str(folder)!r}): pass"
     with files.folder_lock(folder):
         refused = subprocess.run(
             [sys.executable, "-c", program], capture_output=True, text=True
@@ -187,7 +185,7 @@ def test_temporary_folders_are_removed_once_their_process_has_ended(
     """Whatever process number the other process has: in another container it may be any."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     program = (
-        "import sys, time\nfrom szlib.files import temporary_folder\n"
+        "import sys, time\nfrom szlib.core.files import temporary_folder\n"
         "with temporary_folder() as folder:\n    print(folder, flush=True)\n    time.sleep(60)"
     )
     other = subprocess.Popen(

@@ -35,7 +35,7 @@ class StorageError(DataError):
     Examples
     --------
     >>> from pathlib import Path
-    >>> from szlib.files import claim_folder
+    >>> from szlib.core.files import claim_folder
     >>> Path("thesis").mkdir()
     >>> _ = Path("thesis/chapter.txt").write_text("...")
     >>> try:
@@ -51,7 +51,7 @@ class MemoryLimitError(DataError):
 
     Examples
     --------
-    >>> from szlib import memory
+    >>> from szlib.core import memory
     >>> try:
     ...     with memory.granted(10**9):
     ...         memory.require(5e9, "the table")
