@@ -47,7 +47,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
-from laboratory import show_sliders
+from laboratory import draw_step, show_sliders
 from studies import gamma_table, paper_claims, scenario_runs
 from studies.scenario_runs import drive
 
@@ -181,7 +181,7 @@ record.figure(fig, "limit")
 turns = float(log.time[np.argmax(np.abs(log.controls[:, 1]) > 0.5 * a_max)])
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 step = controller.step(*log.controller_inputs(turns))
-fig = figures.draw_step(step)
+fig = draw_step(step)
 fig.suptitle(f"As it turns, at {turns:.1f} s and h = {step.h[0]:.2f} m, the way aside is free")
 record.figure(fig, "admissible")
 

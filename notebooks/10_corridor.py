@@ -46,6 +46,7 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
+from laboratory import draw_step
 from studies import scenario_runs
 from studies.atlas import AtlasCell
 
@@ -205,7 +206,7 @@ record.figure(fig, "holds")
 # Figure
 row = int(log.speed[10 : max(11, round(abeam / settings.dt))].argmin()) + 10
 step = controller.step(*log.controller_inputs(float(log.time[row])))
-fig = figures.draw_step(step)
+fig = draw_step(step)
 fig.suptitle(f"Slowest before abeam, at {log.time[row]:.1f} s: it chooses a corner of what is allowed")
 record.figure(fig, "admissible")
 

@@ -50,11 +50,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
+from laboratory import draw_step, find_admissible_controls
 from studies import chains, scenario_runs
 from studies.atlas import AtlasCell
 
 import szlib
-from szlib.control import find_admissible_controls
 from szlib.simulation.metrics import find_yielding_steps
 from szlib.simulation.strategies import classify_strategy
 from szlib.workbook import figures
@@ -146,7 +146,7 @@ controller = szlib.MPCCBF(log.zones[0], walls=scenes["waiting"].walls, settings=
 waits = np.flatnonzero(find_yielding_steps(log))
 middle = float(log.time[waits[len(waits) // 2] if len(waits) else log.speed[10:].argmin() + 10])
 step = controller.step(*log.controller_inputs(middle))
-fig = figures.draw_step(step)
+fig = draw_step(step)
 ahead = find_admissible_controls(step).polygon.bounds[2]
 fig.suptitle(f"Waiting at {middle:.1f} s: at most {ahead:+.2f} m/s² towards the passage (x) is allowed")
 record.figure(fig, "admissible")

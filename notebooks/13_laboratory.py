@@ -37,10 +37,9 @@ results = "../results"
 # Imports, and the record of the run
 import numpy as np
 import pandas as pd
-from laboratory import PRESETS, Laboratory, RobotOptions, World, explain, is_interactive
+from laboratory import PRESETS, Laboratory, RobotOptions, World, draw_step, explain, is_interactive
 
 import szlib
-from szlib.workbook import figures
 from szlib.workbook.record import NotebookRecord
 
 record = NotebookRecord("13_laboratory", globals())
@@ -57,7 +56,7 @@ Laboratory(zone=zone) if is_interactive() else None
 still = World(PRESETS["corridor"], zone)
 while still.n * still.dt < 4.0:
     still.advance()
-fig = figures.draw_step(still.steps[0])
+fig = draw_step(still.steps[0])
 fig.set_size_inches(9.5, 3.8)
 fig.suptitle(explain(still.steps[0]).sentence, fontsize=11)
 record.figure(fig, "still")

@@ -9,9 +9,10 @@ import numpy as np
 import shapely
 
 import szlib
-from szlib.control import AdmissibleControls, BarrierLimit, find_admissible_controls
 from szlib.control.step import HOLDS
 from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
+
+from .admissible_controls import AdmissibleControls, BarrierLimit, find_admissible_controls
 
 _AT_LIMIT = 0.02  # a limit as near to the chosen acceleration as this share of the bound is active (assumed)
 _SLIGHT = 0.05  # below this share of the bound an acceleration, or of v_max a speed, is not named (assumed)

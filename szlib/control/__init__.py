@@ -33,14 +33,7 @@ from .obstacles import (
 )
 from .people import Person, Prediction, TrackedPeople, Tracker, predict
 from .settings import MPCSettings
-from .step import (
-    STATUSES,
-    AdmissibleControls,
-    BarrierLimit,
-    Scene,
-    Step,
-    find_admissible_controls,
-)
+from .step import STATUSES, Scene, Step
 from .verification import (
     Report,
     compare_distances,

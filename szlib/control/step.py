@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import dist, hypot, inf
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import shapely
@@ -22,9 +22,6 @@ from .ways import Way, blocks
 Status = Literal["optimal", "relaxed", "restarted", "braking"]
 STATUSES: tuple[Status, ...] = get_args(Status)
 """How a control was found; see `Step.status`."""
-# Of the curves of limits: their reach, in half-widths of the box of accelerations, so that they cross it; the
-# number of their points, between which they are straight to 1e-3 m/s2; and the halvings that find them.
-_REACH, _POINTS, _BISECTIONS = 3, 49, 20
 HOLDS = (
     2e-3  # a barrier condition whose residual is smaller than this holds the robot [m]
 )
@@ -432,109 +429,3 @@ class Step:
             return f"more than N = {s.N} steps, an a_max above {s.a_max:g}, or a v_max below {s.v_max:g}"
         longer = f"an N_h above {s.N_h}" if s.N_h < s.N else f"an N above {s.N}"
         return f"brake earlier: a gamma below {s.gamma:g}, {longer}, or a v_max below {s.v_max:g}"
-
-
-class BarrierLimit(NamedTuple):
-    """The edge of what one barrier row allows.
-
-    Attributes
-    ----------
-    row : place of the obstacle in `Step.obstacles`.
-    k : the row links steps k and k + 1 of the plan.
-    curve : points with the allowed side on the left, shape (n, 2) [m/s2].
-    """
-
-    row: int
-    k: int
-    curve: Array
-
-
-class AdmissibleControls(NamedTuple):
-    """All first accelerations that obey every row, with the rest of the plan unchanged [m/s2, world frame].
-
-    Attributes
-    ----------
-    polygon : a Shapely polygon, which may be empty or have several parts.
-    limits : the barrier rows that forbid something that the bounds and the speed limit allow.
-    """
-
-    polygon: Any
-    limits: tuple[BarrierLimit, ...]
-
-
-def find_admissible_controls(step: Step) -> AdmissibleControls:
-    """Find the accelerations that a step could have chosen: bounds, speed limit, and every barrier row.
-
-    Prices are ignored: every decay counts as hard. A terminal condition is ignored, because with the rest of
-    the plan unchanged it allows only the chosen acceleration. If the plan is not feasible, the polygon is
-    empty or does not contain the control.
-
-    Parameters
-    ----------
-    step : of an `MPCCBF`.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> import szlib
-    >>> from szlib.control import find_admissible_controls
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> step = controller.step((-2.5, 0.0, 0.2, 0.0), (4.0, 0.0), [szlib.Person((0.0, 0.0))])
-    >>> found = find_admissible_controls(step)
-    >>> found.polygon.distance(shapely.Point(step.control)) < 1e-3
-    True
-    """
-    s, u0, x = step.scene.settings, step.control, step.predicted
-    free = shapely.box(-s.a_max, -s.a_max, s.a_max, s.a_max)
-    for velocity in x[1:, 2:]:
-        disc = shapely.Point(u0 - velocity / s.dt).buffer(s.v_max / s.dt, quad_segs=256)
-        free = free.intersection(disc)
-    polygon, limits = free, []
-    kinds = (g.kind for g in step.scene.barriers.groups for _ in g.offsets)
-    for i, (row, kind) in enumerate(zip(step.scene.rows, kinds, strict=True)):
-        for condition in list_conditions(s, kind, has_floors=s.decay_price < inf):
-            for k, (curve, inward) in enumerate(_find_edges(step, i, condition.keep)):
-                outer = curve[::-1] + 2 * _REACH * s.a_max * inward
-                allowed = shapely.Polygon(np.vstack([curve, outer]))
-                if not allowed.covers(free):
-                    limits.append(BarrierLimit(row, k, curve))
-                    polygon = polygon.intersection(allowed)
-    return AdmissibleControls(polygon, tuple(limits))
-
-
-def _find_edges(
-    step: Step, i: int, keep: tuple[float, ...]
-) -> list[tuple[Array, Array]]:
-    """The edge of each row of the near obstacle `i`, and the direction to its allowed side."""
-    s, u0, n = step.scene.settings, step.control, len(keep)
-    reach = _REACH * s.a_max
-    nudges = 1e-3 * s.a_max * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
-    at = np.broadcast_to(u0 + nudges, (n, 4, 2))
-    right, left, up, down = np.moveaxis(_find_residuals(step, i, keep, at), -1, 0)
-    inward = np.stack([right - left, up - down], axis=-1)
-    steepest = np.hypot(inward[:, :1], inward[:, 1:])
-    inward = np.where(
-        steepest > 0, inward / np.where(steepest > 0, steepest, 1.0), (1.0, 0.0)
-    )
-    across = np.stack([inward[:, 1], -inward[:, 0]], axis=-1)
-    along = u0 + np.linspace(-reach, reach, _POINTS)[:, None] * across[:, None, :]
-    low, high = np.full((n, _POINTS), -reach), np.full((n, _POINTS), reach)
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        edges = along + middle[..., None] * inward[:, None, :]
-        obeys = _find_residuals(step, i, keep, edges) >= 0
-        low, high = np.where(obeys, low, middle), np.where(obeys, middle, high)
-    edges = along + high[..., None] * inward[:, None, :]
-    return list(zip(edges, inward, strict=True))
-
-
-def _find_residuals(step: Step, i: int, keep: tuple[float, ...], first: Array) -> Array:
-    """Residuals of n rows of the near obstacle `i` for other first controls, (n, m, 2) to (n, m)."""
-    s, n = step.scene.settings, len(keep)
-    only = Obstacles.of(step.scene.barriers.items[i : i + 1], s)
-    times = np.array(s.times[: n + 1])[:, None]
-    moved, found = s.dt * np.maximum(times - s.dt / 2, 0)[..., None], list[Array]()
-    for rows in (slice(n), slice(1, n + 1)):
-        at = step.predicted[rows, None, :2] + moved[rows] * (first - step.control)
-        found.append(only.h(at[..., 0], at[..., 1], times[rows])[0])
-    return np.asarray(found[1] - np.array(keep)[:, None] * found[0])

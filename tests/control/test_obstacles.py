@@ -14,6 +14,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from laboratory import plot_admissible_controls
 
 import szlib
 from szlib.control import HalfPlane, Obstacle, Obstacles, Wall, Zone
@@ -449,7 +450,7 @@ def test_an_obstacle_goes_through_run_log_and_figures(obstacle, kind, tmp_path: 
     step = controller.step(log.states[-1] if kind != "two wheels" else [0, 0.9, 0], (3.0, 0.2))  # fmt: skip
     point = getattr(step, "point", step)
     figures.plot_step(point)
-    figures.plot_admissible_controls(point)
+    plot_admissible_controls(point)
     plt.close("all")
     assert step.verify().ok and point.scene.name(1).startswith(f"{obstacle.kind} 0 (")
 

@@ -48,7 +48,9 @@ def describe(world):
     return repr(shown)
 
 
-@pytest.mark.parametrize("module", ["world", "explanation", "widget"])
+@pytest.mark.parametrize(
+    "module", ["world", "admissible_controls", "explanation", "widget"]
+)
 def test_examples_run(module):
     assert doctest.testmod(getattr(laboratory, module)).failed == 0
 

@@ -323,18 +323,6 @@ def test_speed_and_barriers_show_the_whole_range(log):
     assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()
 
 
-def test_admissible_controls_name_the_person_and_the_walls_that_forbid_others(step):
-    ax = figures.plot_admissible_controls(step)
-    assert ax.get_xlabel().endswith("[m/s²]") and ax.get_aspect() == 1
-    labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert {"allowed", "chosen"} <= set(labels)
-    assert {name.split(",")[0] for name in labels} >= {"person 0", "wall 1"}
-    styles = [
-        line.get_linestyle() for line in ax.lines if "step" in str(line.get_label())
-    ]
-    assert len(set(styles)) == len(styles) == 2  # readable without colour
-
-
 def test_the_limits_hold_everything_that_is_drawn(log):
     ax = figures.plot_scenario(log, every=1.0)
     limits = np.array([ax.get_xlim(), ax.get_ylim()])

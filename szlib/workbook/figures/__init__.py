@@ -7,7 +7,7 @@ style        sizes, labels in metres, people, legends
 tracks       where people walked, how fast, and how many rows each stage keeps
 encounters   the attentional space, paths, and where the other person is
 zones        outliers, the hull, zones by speed, the pair correlation
-control      distances and barriers, the accelerations that a step allows, and its ways
+control      distances and barriers, the scene of a step, and its ways
 simulation   runs of the robot, and their animations
 movies       runs as players in a browser
 comparisons  many runs or fits: sweeps, strategies, intervals, claims, sites
@@ -24,8 +24,6 @@ from .comparisons import (
     plot_zone_sizes,
 )
 from .control import (
-    draw_step,
-    plot_admissible_controls,
     plot_distance,
     plot_distance_error,
     plot_step,

@@ -1,4 +1,4 @@
-"""Figures of barriers and steps: a distance, its error, allowed accelerations, and the ways of a step."""
+"""Figures of barriers and steps: a distance, its error, the scene of a step, and its ways."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import contourpy
-import matplotlib.pyplot as plt
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
-from shapely.plotting import patch_from_polygon
 
 from ...control.obstacles import (
     Obstacle,
@@ -23,7 +20,7 @@ from ...control.obstacles import (
     ellipse_distance,
     segment_distance,
 )
-from ...control.step import BarrierLimit, Step, find_admissible_controls
+from ...control.step import Step
 from ...control.verification import (
     compute_distance_error,
     find_safe_boundary,
@@ -34,8 +31,6 @@ from ...zones.ellipses import Ellipse
 from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from .style import add_legend_below, draw_person, get_axes, label_metres
 
-# Line styles of obstacles that stand still; after the last again from the first.
-_LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 # Points on each side of the grid on which the outline of an obstacle is found.
 _GRID = 201
 _CHORD_ERROR = 1e-3  # distance of a corner of this outline that may be left out [m]
@@ -179,120 +174,6 @@ def _distance(points: Array, shape: Ellipse | ArrayLike) -> Array:
 
 def _outline(shape: Ellipse | ArrayLike) -> Array:
     return shape.curve() if isinstance(shape, Ellipse) else check_wall(shape)
-
-
-def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
-    """Plot all first accelerations that obey every constraint of a step, and the chosen one.
-
-    The rest of the plan stays as it is. Each line is the limit from one obstacle, hatched where it
-    forbids; of several limits the one that forbids most is drawn.
-
-    Parameters
-    ----------
-    step : result of a controller's `step`.
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> step = controller.step((0, 0, 0.5, 0), (6, 0), [szlib.Person((3.0, 0.5), (-1.0, 0.0))])
-    >>> figures.plot_admissible_controls(step).get_xlabel()
-    'a_x [m/s²]'
-    """
-    ax, a_max = get_axes(ax, size=(5, 4.6)), step.scene.settings.a_max
-    found, reach = find_admissible_controls(step), 1.25 * a_max
-    if not found.polygon.is_empty:
-        ax.add_patch(
-            patch_from_polygon(
-                found.polygon, facecolor=GREEN, alpha=0.45, label="allowed"
-            )
-        )
-    bounds = Rectangle(
-        (-a_max, -a_max), 2 * a_max, 2 * a_max, fill=False, edgecolor=GREY, lw=1
-    )
-    ax.add_patch(bounds).set_label("bound of the acceleration")
-    for limit, forbidden in _strictest_limits(found.limits, reach):
-        number = limit.row - len(step.scene.people)
-        colour, line = (
-            (RED, "-") if number < 0 else (BLACK, _LINES[number % len(_LINES)])
-        )
-        name = f"{step.scene.name(limit.row).partition(' (')[0]}, step {limit.k} to {limit.k + 1}"
-        ax.plot(*limit.curve.T, linestyle=line, color=colour, linewidth=1.8, label=name)
-        if not forbidden.is_empty:
-            style = {
-                "fill": False,
-                "hatch": "///",
-                "edgecolor": colour,
-                "lw": 0,
-                "alpha": 0.35,
-            }
-            ax.add_patch(patch_from_polygon(forbidden, **style))
-    ax.plot(
-        (-reach, reach, np.nan, 0, 0),
-        (0, 0, np.nan, -reach, reach),
-        color=GREY,
-        linewidth=0.6,
-    )
-    ax.plot(
-        *step.control,
-        "*",
-        color=BLUE,
-        markersize=15,
-        markeredgecolor=BLACK,
-        label="chosen",
-    )
-    ax.set(
-        xlabel="a_x [m/s²]",
-        ylabel="a_y [m/s²]",
-        xlim=(-reach, reach),
-        ylim=(-reach, reach),
-    )
-    what = (
-        "No acceleration is allowed"
-        if found.polygon.is_empty
-        else "Green: the accelerations allowed"
-    )
-    ax.set(aspect="equal", title=what)
-    add_legend_below(ax, gap=0.16)
-    return ax
-
-
-def _strictest_limits(
-    limits: tuple[BarrierLimit, ...], reach: float
-) -> list[tuple[BarrierLimit, Any]]:
-    """The limit of each obstacle that forbids most of the figure, and the part that it forbids."""
-    box = shapely.box(-reach, -reach, reach, reach)
-    strictest: dict[int, tuple[BarrierLimit, Any]] = {}
-    for limit in limits:
-        (x0, y0), (x1, y1) = limit.curve[0], limit.curve[-1]
-        right = np.array([y1 - y0, x0 - x1]) / np.hypot(x1 - x0, y1 - y0)
-        side = shapely.Polygon(
-            np.vstack([limit.curve, limit.curve[::-1] + 4 * reach * right])
-        )
-        forbidden, source = side.intersection(box), limit.row
-        if source not in strictest or forbidden.area > strictest[source][1].area:
-            strictest[source] = limit, forbidden
-    return list(strictest.values())
-
-
-def draw_step(step: Step) -> Figure:
-    """Draw the scene of a `step` beside the accelerations that it allows, in two squares of one size.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> step = controller.step((0, 0, 0.5, 0), (6, 0), [szlib.Person((3.0, 0.5), (-1.0, 0.0))])
-    >>> len(figures.draw_step(step).axes)
-    2
-    """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
-    plot_step(step, ax=left)
-    plot_admissible_controls(step, ax=right)
-    return figure
 
 
 def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:

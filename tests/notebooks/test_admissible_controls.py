@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import shapely
+from laboratory import find_admissible_controls, plot_admissible_controls
 
 import szlib
-from szlib.control import Step, find_admissible_controls
+from szlib.control import Step
 
 ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
 PASSAGE = szlib.SCENARIOS["making_room"].walls
@@ -138,3 +140,17 @@ def test_limits_are_rows_of_the_step_among_many_walls() -> None:
     assert step.scene.near == (30,)
     (row,) = {each.row for each in find_admissible_controls(step).limits}
     assert step.obstacles[row].numbers == (-6.0, 1.0, 6.0, 1.0)
+
+
+def test_admissible_controls_name_the_person_and_the_walls_that_forbid_others() -> None:
+    step = step_at(*MOMENTS["backing out"])
+    ax = plot_admissible_controls(step)
+    assert ax.get_xlabel().endswith("[m/s²]") and ax.get_aspect() == 1
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"allowed", "chosen"} <= set(labels)
+    assert {name.split(",")[0] for name in labels} >= {"person 0", "wall 1"}
+    styles = [
+        line.get_linestyle() for line in ax.lines if "step" in str(line.get_label())
+    ]
+    assert len(set(styles)) == len(styles) == 2  # readable without colour
+    plt.close(ax.figure)
