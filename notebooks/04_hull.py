@@ -45,6 +45,7 @@ import warnings
 
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 from IPython.display import Markdown
 from scipy.spatial import ConvexHull
 from studies import real_day
@@ -77,7 +78,7 @@ zone = szlib.SocialZone.fit(samples, method="paper", **fit)
 points = np.column_stack([outliers.complementary_points(inliers, r_max=r_max), inliers["speed"]])
 fig = plt.figure(figsize=(11, 4.1), layout="constrained")
 left, right = fig.add_subplot(1, 2, 1, projection="3d"), fig.add_subplot(1, 2, 2)
-figures.plot_hull(zone, list(zone.ellipses), points=points, ax=left)
+plots.plot_hull(zone, list(zone.ellipses), points=points, ax=left)
 left.set_title(
     "One hull around all samples, cut at four speeds" if len(zone.ellipses) == 4 else "Hull and slices"
 )

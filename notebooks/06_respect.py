@@ -42,6 +42,7 @@ import warnings
 
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 from IPython.display import Markdown
 from studies import real_day, respect
 
@@ -390,7 +391,7 @@ names = {"atc-1hz": "ATC day", "grand-central": "Grand Central"}
 for ax, (site, part) in zip(panels, curves.groupby("site"), strict=True):
     start, end = part["hull_a"].iloc[[0, -1]]
     title = f"{names[site]}: the hull shrinks from {start:.2f} to {end:.2f} m"
-    figures.plot_zone_sizes(part, shown, ax=ax).set_title(title)
+    plots.plot_zone_sizes(part, shown, ax=ax).set_title(title)
     ax.set_xticks([n for n in (36, 72, 150, 600, 2400) if n <= part["encounters"].max()])
     ax.xaxis.set_major_formatter("{x:.0f}")
     ax.minorticks_off()

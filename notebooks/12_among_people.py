@@ -46,6 +46,7 @@ from heapq import heappop, heappush
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 import shapely
 from IPython.display import Markdown, display
 
@@ -247,14 +248,14 @@ steps = {
 }
 fig, panels = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
 for ax, (name, step) in zip(panels, steps.items(), strict=True):
-    figures.plot_ways(replace(step, ways=()), ax).set(ylim=(-4.5, 8.5), title=name)
+    plots.plot_ways(replace(step, ways=()), ax).set(ylim=(-4.5, 8.5), title=name)
 record.figure(fig, "before")
 
 # %% jupyter={"source_hidden": true}
 # Figure
 fig, panels = plt.subplots(1, 3, figsize=(11, 4.6), layout="constrained")
 for ax, (name, step) in zip(panels, steps.items(), strict=True):
-    figures.plot_ways(step, ax).set(ylim=(-4.5, 8.5))
+    plots.plot_ways(step, ax).set(ylim=(-4.5, 8.5))
     ax.set_title(f"{name}: {ax.get_title()}")
     ax.get_legend().set_bbox_to_anchor((0.5, -0.2), ax.transAxes)
 record.figure(fig, "ways")

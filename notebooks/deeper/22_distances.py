@@ -37,9 +37,13 @@ eccentricities = [0.0, 0.3, 0.5, 0.65, 0.8, 0.9, 0.99]  # of ellipses as long as
 
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
+import sys
+
+sys.path.append("..")  # for `plots`
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 
 import szlib
@@ -65,9 +69,9 @@ parameters(
 zone = record.cache.ellipse()
 end, start = np.array([(0.5, 0.0), (-0.5, 0.0)])
 fig, sides = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-figures.plot_distance_error(zone, r_robot=r, eps=eps, extent=2.1, ax=sides[0])
+plots.plot_distance_error(zone, r_robot=r, eps=eps, extent=2.1, ax=sides[0])
 sides[0].set_title("Around a zone the distance d is never too long")
-figures.plot_distance_error([start, end], r_robot=r, eps=eps, extent=1.3, ax=sides[1])
+plots.plot_distance_error([start, end], r_robot=r, eps=eps, extent=1.3, ax=sides[1])
 needed = verification.required_margin([start, end], r)
 sides[1].set_title(f"At the ends of a wall of 1 m it is {100 * needed:.0f} cm too long")
 record.figure(fig, "maps")

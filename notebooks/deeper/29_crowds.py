@@ -41,10 +41,11 @@ n_replaced = 10  # recorded people whom the robot replaces; 40 at each site for 
 import sys
 from importlib.util import find_spec
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown, display
 from studies import crowd_trials, differential_table, walkers
 
@@ -165,7 +166,7 @@ labels = {
 }
 seen = reacting[(reacting["sees"] == "robot") & reacting["controller"].isin(shown)]
 title = "Among people who react, MPC-CBF with its defaults stays out of zones, and takes the longest"
-fig = figures.draw_interval_grid(seen, labels, rows="crowd", colour="controller", title=title)
+fig = plots.draw_interval_grid(seen, labels, rows="crowd", colour="controller", title=title)
 record.figure(fig, "reacting")
 
 # %% jupyter={"source_hidden": true}
@@ -247,7 +248,7 @@ record.check(
 # %% jupyter={"source_hidden": true}
 # Figure
 by_crowd = promises[promises["controller"] == "MPC-CBF"].groupby("crowd", sort=False).sum(numeric_only=True)
-ax = figures.plot_safety_claims(by_crowd)
+ax = plots.plot_safety_claims(by_crowd)
 ax.set_title("szlib's defaults: people break claims by appearing and turning")
 record.figure(ax.figure, "promises")
 
@@ -323,7 +324,7 @@ of_ways = {
     "jerk": "mean squared jerk [m²/s⁶]",
 }
 title = "Among recorded people, at up to 1 m/s: among_people() arrives, and stays out of most zones"
-fig = figures.draw_interval_grid(at_one, of_ways, rows="crowd", colour="controller", columns=2, title=title)
+fig = plots.draw_interval_grid(at_one, of_ways, rows="crowd", colour="controller", columns=2, title=title)
 record.figure(fig, "sites")
 
 # %% jupyter={"source_hidden": true}

@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from shapely.plotting import patch_from_polygon
+from szlib.core.checks import Array
 
 import szlib
-from szlib.checks import Array
 from szlib.control import Obstacles
 from szlib.control.problem import list_conditions
 from szlib.workbook import figures
