@@ -12,11 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from shapely.plotting import patch_from_polygon
-from szlib.core.checks import Array
 
 import szlib
 from szlib.control import Obstacles
 from szlib.control.problem import list_conditions
+from szlib.core.checks import Array
 from szlib.workbook import figures
 
 # Of the curves of limits: their reach, in half-widths of the box of accelerations, so that they cross it; the

@@ -90,10 +90,7 @@ def test_summary_has_not_passed_before_the_run_ends(workbook, tmp_path, monkeypa
     monkeypatch.setattr(
         runner, "wait", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
     )
-    assert (
-        main(["run", "--data", "mine.csv", "--out", "out", "--only", "08", "--force"])
-        == 130
-    )
+    assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08"]) == 130
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert (left["passed"], left["unfinished"], list(left["notebooks"])) == (
         False,
