@@ -29,8 +29,6 @@ EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 STOPPED = Event()
 # A signal that ends a kernel and the run reaches the run within this time [s].
 _SIGNAL_DELAY = 1.0
-# The backend that shows figures in a notebook.
-_INLINE = "module://matplotlib_inline.backend_inline"
 
 
 def execute_notebook(
@@ -100,7 +98,7 @@ def run_cells(
     from nbclient import NotebookClient
     from nbclient.exceptions import DeadKernelError
 
-    from .kernel import OwnKernelManager
+    from .kernel import INLINE, OwnKernelManager
 
     # The parameters of the zone are in no notebook's own cell.
     logging.getLogger("papermill").setLevel(logging.ERROR)
@@ -126,7 +124,7 @@ def run_cells(
             f"--InteractiveShellApp.exec_lines={add}",
         ],
     )
-    own = {"MPLBACKEND": _INLINE, "PYTHONSAFEPATH": "1"}
+    own = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1"}
     is_stopped = False
     try:
         # the loop of this thread, which Jupyter leaves open

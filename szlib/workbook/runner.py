@@ -28,7 +28,7 @@ from ..core import memory
 from ..core.errors import DataError
 from ..core.files import folder_lock, temporary_folder, write_file
 from ..core.input_files import file_content, read_json_object
-from ..core.parallel import limit_jobs, uninterrupted
+from ..core.parallel import limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
 from . import folders
 from .execution import EMPTY_RECORD, STOPPED, execute_notebook
@@ -87,7 +87,7 @@ def run(
     root = folders.default_results(place) if out is None else folders.results_root(out)
     data = folders.absolute_data(data)
     home = folders.claim_results(root, data, given)
-    with folder_lock(home):
+    with folder_lock(home), safe_path():
         cache = DataCache(home, data, seed=given.get("seed", 0))
         contents = [[file.name, *file_content(file)] for file in cache.files()]
         source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
@@ -193,7 +193,7 @@ def _execute_all(
     executor = ThreadPoolExecutor(jobs)  # of threads that wait for kernels
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
     with bar, temporary_folder() as private:
-        environment |= {"TMPDIR": private, "IPYTHONDIR": private}
+        environment |= {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
         try:
             for batch in split_batches(scripts):
                 if is_refused:
@@ -232,7 +232,8 @@ def _end_kernels() -> None:
     STOPPED.set()
     for process in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
-            if any("ipykernel" in word for word in process.cmdline()):
+            words = " ".join(process.cmdline())
+            if "ipykernel" in words or "multiprocessing.forkserver" in words:
                 process.kill()
 
 
