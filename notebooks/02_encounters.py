@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: encounters
+#     paper: sec. 2, fig. 2-3
+#     aim: say when two people meet alone, and compute where one sees the other.
+#     asks: When do two people meet with nobody else around?
+#     needs:
+#     - '01'
+#     exercises:
+#     - 1.2-1.3
+#     week: 1
 # ---
 
 # %% [markdown]

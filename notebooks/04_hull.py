@@ -9,6 +9,17 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: hull
+#     paper: sec. 2, fig. 4b
+#     aim: turn samples into a hull, cut it at a speed, and enclose the zone in the smallest ellipse.
+#     asks: How near did people come, in each direction, at each speed?
+#     needs:
+#     - '03'
+#     exercises:
+#     - 3.1-3.3
+#     - '4.2'
+#     week: 2
 # ---
 
 # %% [markdown]

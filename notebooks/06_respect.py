@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: respect
+#     paper: sec. 2
+#     aim: tell respect from emptiness by a null model.
+#     asks: Do people avoid each other, or do they rarely meet?
+#     needs:
+#     - '05'
+#     exercises:
+#     - 4.3-4.5
+#     week: 2
 # ---
 
 # %% [markdown]

@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: among people
+#     paper: sec. 4-5
+#     aim: choose settings for a robot among people and walls, and say where it will not arrive.
+#     asks: How does the robot do among walls and many people? What does it do if you drag the person?
+#     needs:
+#     - 09
+#     exercises:
+#     - '6.5'
+#     week: 6
 # ---
 
 # %% [markdown]

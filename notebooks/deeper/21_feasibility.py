@@ -9,6 +9,15 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: feasibility
+#     paper: sec. 4
+#     aim: say when a step has no solution, and prove when there always is one.
+#     asks: When is no safe choice left? Is the margin of the approximate distances enough?
+#     needs:
+#     - 08
+#     exercises:
+#     - '6.3'
 # ---
 
 # %% [markdown]

@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: comparison
+#     paper: sec. 1, 5
+#     aim: compare zones and controllers in the same worlds, with intervals.
+#     asks: What would a circle, or no zone, have done in the same worlds?
+#     needs:
+#     - 09
 # ---
 
 # %% [markdown]

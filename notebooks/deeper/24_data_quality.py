@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: data quality
+#     paper: sec. 2
+#     aim: judge whether a file of tracks can be used, and find days unlike the others.
+#     asks: Can a file of tracks be trusted? How are 92 days processed?
+#     needs:
+#     - '03'
 # ---
 
 # %% [markdown]

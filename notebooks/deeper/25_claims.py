@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: claims
+#     paper: all
+#     aim: say which claims of the paper the data supports, and with which interval.
+#     asks: Which claims and which sentences of the paper does data support?
+#     needs:
+#     - '06'
 # ---
 
 # %% [markdown]

@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: atlas
+#     paper: sec. 4-5
+#     aim: predict from gamma, width, speed and zone what the robot will do.
+#     row: '26'
+#     needs:
+#     - '11'
 # ---
 
 # %% [markdown]

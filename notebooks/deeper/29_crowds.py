@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: crowds
+#     paper: sec. 4-5
+#     aim: say which safety claims of the controller hold among people who react.
+#     row: '26'
+#     needs:
+#     - '12'
 # ---
 
 # %% [markdown]
