@@ -6,6 +6,7 @@ Environment variables: $SZLIB_REPOSITORY, such as OWNER/szlib on GitHub, adds li
 $SZLIB_DOCS_NOTEBOOKS, such as "07*", makes a site of these notebooks only, for a test.
 """
 
+import importlib
 import inspect
 import os
 import re
@@ -25,7 +26,7 @@ ROOT, PAGES = HERE.parent, HERE / "pages"
 NOTEBOOKS = ROOT / "notebooks"
 ONLY = os.environ.get("SZLIB_DOCS_NOTEBOOKS", "*")
 ROOMS = (
-    "core",
+    "core.errors",
     "tracks",
     "encounters",
     "zones",
@@ -50,6 +51,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["README.md"]  # the first page includes it
 html_theme = "furo"
 html_math_renderer = "mathml"
+html_show_search_summary = False  # a page from a file may not read others
 nb_execution_mode = "off"
 nb_ipywidgets_js = {}  # no scripts of other servers
 nb_render_image_options = {"width": "100%"}
@@ -172,8 +174,8 @@ def make_bibtex():
 
 def describe_room(room):
     """The page of a room: its own text, and a directive for each of its public names."""
-    module = getattr(szlib, room)
     title = f"szlib.{room}"
+    module = importlib.import_module(title)
     lines = [
         title,
         "=" * len(title),

@@ -211,7 +211,9 @@ record.figure(fig, "test")
 # Checks, and the answer
 for name, each in tests.items():
     record.key[f"p-value, {name}"] = each.p_value
-record.claim("people keep out of each other's way more than by chance", found, str(test))
+where = "; a busier plaza than that of the zone" if is_plaza else ""
+least = f"1/{shifts + 1} is the least p that {shifts} shifts allow{where}"
+record.claim("people keep out of each other's way more than by chance", found, f"{test}; {least}")
 Markdown(
     f"""<details><summary>Answer</summary>
 

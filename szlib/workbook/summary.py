@@ -12,6 +12,7 @@ from typing import Any
 from ..core.errors import StorageError, warn
 from ..core.files import write_file
 from ..core.input_files import printable, read_small
+from .folders import require_place
 from .record.display import format_value
 
 # The environment variable in which GitHub names the file for the summary of a step.
@@ -101,9 +102,7 @@ def require_junit(file: Path) -> Path:
     """The `file`, if JUnit XML can be written there without replacing anything else; else StorageError."""
     if file.suffix != ".xml":
         raise StorageError(f"{printable(file)}: expected a file that ends in .xml")
-    if not file.parent.is_dir() or not os.access(file.parent, os.W_OK):
-        place = printable(file.parent)
-        raise StorageError(f"{place}: is no folder that can be written; choose another")
+    require_place(file)
     if file.exists() and b"<testsuites" not in read_small(file)[:100]:
         what = "exists, and is no JUnit XML of szlib; choose another name"
         raise StorageError(f"{printable(file)}: {what}")

@@ -316,9 +316,9 @@ def test_a_quantile_zone_shows_its_radii_and_has_no_hull(samples):
         plots.plot_hull(zone)
 
 
-def test_speed_and_barriers_show_the_whole_range(log):
-    speed, h = figures.plot_speed(log), figures.plot_barriers(log)
-    assert "[m/s]" in speed.get_ylabel() and "[m]" in h.get_ylabel()
+def test_barriers_show_the_whole_range(log):
+    h = figures.plot_barriers(log)
+    assert "[m]" in h.get_ylabel()
     assert len(h.lines) == 3, "the person, the nearest of two walls, zero"
     assert np.array_equal(h.lines[1].get_ydata(), log.h[:, 1:].min(axis=1))
     assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()

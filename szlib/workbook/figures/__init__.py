@@ -26,7 +26,6 @@ from .simulation import (
     plot_crowd,
     plot_robot_paths,
     plot_scenario,
-    plot_speed,
 )
 from .style import add_legend_below, add_shared_legend, alt_text, get_axes, label_metres
 from .tracks import plot_map
