@@ -21,8 +21,9 @@ run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza; fails wh
 report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML file
 	$(BIN)/szlib report --open
 
-docs: $(INSTALLED)  ## results/site: each public name of szlib, which settings to choose, the notebooks, the last report
-	$(BIN)/python notebooks/tools/docs.py results/site
+docs: $(INSTALLED)  ## results/site: README, notebooks, which settings to choose, each public name, changes; no network
+	mkdir -p docs/pages
+	$(BIN)/sphinx-build -q -c docs -d docs/pages/.doctrees docs/pages results/site
 
 slides: $(INSTALLED)  ## results/slides: a deck of each notebook, and all figures; SLIDES_FLAGS="--reveal FOLDER" needs no network
 	$(BIN)/python notebooks/tools/slides.py $(SLIDES_FLAGS)
@@ -53,7 +54,7 @@ lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, fro
 # Warnings are no errors here: old libraries warn of each other, which one test of a fresh process does not allow.
 lowest: $(INSTALLED)  ## the suite without the workbook, with the oldest version of every dependency
 	$(BIN)/uv venv --quiet --clear $(VENV)/lowest
-	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct -e ".[cluster,crowds,pedpy,test]"
+	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct -e ".[cluster,crowds,data,pedpy,test]" matplotlib==3.9.*
 	$(VENV)/lowest/$(notdir $(BIN))/python -m pytest -p no:cacheprovider -W default -n 2 --dist loadfile \
 	    --deselect tests/simulation/test_crowds.py::test_social_force_leaves_no_file_and_restores_logging \
 	    tests/tracks tests/encounters tests/zones tests/plaza tests/control tests/simulation

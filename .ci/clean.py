@@ -23,14 +23,6 @@ OF_RUN = (
     f"{NOTEBOOK}.ipynb", f"{NOTEBOOK}.csv", f"records/{NOTEBOOK}.json", f"figures/{NOTEBOOK}",
     *CACHED, *(f"{name}.json" for name in CACHED),
 )  # fmt: skip
-# What `make docs` writes.
-OF_SITE = (
-    "index.html",
-    "which_settings.html",
-    "reference.html",
-    "report.html",
-    "szlib.*.html",
-)
 # What `make slides` writes.
 OF_SLIDES = (f"{NOTEBOOK}.html", f"figures/{NOTEBOOK}.png")
 
@@ -42,8 +34,8 @@ def clean(results: Path) -> None:
             if read_purpose(folder / "days") == DAYS:  # of notebook 24
                 shutil.rmtree(folder / "days")
             remove(folder, OF_RUN)
-    remove(results / "site/notebooks", OF_RUN)
-    remove(results / "site", OF_SITE)
+    if (results / "site" / "searchindex.js").exists():  # of `make docs`
+        shutil.rmtree(results / "site")
     remove(results / "slides", OF_SLIDES)
     for folder in (results / "lab", results):
         if read_purpose(folder) == WORKBOOK:
@@ -74,6 +66,7 @@ def read_purpose(folder: Path) -> str:
 
 if __name__ == "__main__":
     shutil.rmtree(ROOT / ".venv", ignore_errors=True)
+    shutil.rmtree(ROOT / "docs" / "pages", ignore_errors=True)
     clean(ROOT / "results")
     if kept := sorted(path.name for path in (ROOT / "results").glob("[!.]*")):
         print(f"results/ keeps what szlib run did not write: {', '.join(kept)}")

@@ -32,7 +32,8 @@ EXCLUDED = shutil.ignore_patterns(
 )
 # What the wheel holds of the notebooks.
 NOTEBOOKS = (
-    "[0-9]*.py", "deeper/*.py", "laboratory/*.py", "laboratory/*.js", "studies/*.py", "exercises/*.py",
+    "[0-9]*.py", "deeper/*.py", "laboratory/*.py", "laboratory/*.js", "plots/*.py", "studies/*.py",
+    "exercises/*.py",
     "exercises/judges/*.*", "solutions/*.py", "examples/*.py", "tables/*.csv",
     "project/*.*", "project/rivals/*.py",
     "which_settings.md", "reference.md", "figures/mall.png", "figures/making_room.gif",

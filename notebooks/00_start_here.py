@@ -9,6 +9,9 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     paper: all
+#     aim: choose a route, and take the first step.
 # ---
 
 # %% [markdown]

@@ -9,6 +9,15 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: tracks
+#     paper: sec. 2, fig. 1
+#     aim: bring files of tracks to one clock, and say where two people can be watched.
+#     asks: Where do people walk, how fast, and where is open space?
+#     exercises:
+#     - '1.1'
+#     - 1.4-1.5
+#     week: 1
 # ---
 
 # %% [markdown]

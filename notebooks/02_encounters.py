@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: encounters
+#     paper: sec. 2, fig. 2-3
+#     aim: say when two people meet alone, and compute where one sees the other.
+#     asks: When do two people meet with nobody else around?
+#     needs:
+#     - '01'
+#     exercises:
+#     - 1.2-1.3
+#     week: 1
 # ---
 
 # %% [markdown]
@@ -45,6 +55,7 @@ examples = 100  # paths drawn
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from matplotlib.patches import Rectangle
 from studies import real_day
@@ -91,7 +102,7 @@ figures.label_metres(left, "Seen at 45°: ahead, to the left", person=True).lege
     loc="upper right", fontsize=8
 )
 paths = reference_frame(tracks, samples)
-figures.plot_encounter_paths(paths, n_shown=examples, ax=right)
+plots.plot_encounter_paths(paths, n_shown=examples, ax=right)
 right.set_title(f"{min(examples, count)} of {count:,} encounters")
 right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
 record.figure(fig, "paths")
@@ -261,12 +272,12 @@ record.figure(fig, "windows")
 
 # %% jupyter={"source_hidden": true}
 # Figure
-ax = figures.plot_relative_positions(samples, r_max=record.cache.method.r_max)
+ax = plots.plot_relative_positions(samples, r_max=record.cache.method.r_max)
 record.figure(ax.figure, "los")
 
 # %% jupyter={"source_hidden": true}
 # Figure
-ax = figures.plot_distance_by_direction(samples, r_max=record.cache.method.r_max)
+ax = plots.plot_distance_by_direction(samples, r_max=record.cache.method.r_max)
 ax.figure.set_size_inches(7, 3.8)
 record.figure(ax.figure, "los-distance")
 
@@ -323,7 +334,7 @@ strict = szlib.find_encounters(tracks, square=square, settings=conditions, throu
 fig, both = plt.subplots(1, 2, figsize=(10, 4), layout="constrained", sharex=True, sharey=True)
 behind, r_max = [], record.cache.method.r_max
 for ax, name, each in zip(both, ("at the opening", "throughout"), (samples, strict), strict=True):
-    figures.plot_relative_positions(each, r_max=r_max, ax=ax)
+    plots.plot_relative_positions(each, r_max=r_max, ax=ax)
     behind.append(int((each["los_angle"].abs() > np.pi / 2)[each["distance"] <= r_max].sum()))
     n = each["encounter"].nunique()
     ax.set_title(f"inside {name}: {n:,} encounters,\n{behind[-1]:,} close samples behind the person")

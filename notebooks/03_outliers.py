@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: outliers
+#     paper: sec. 2, fig. 4a
+#     aim: say whom a rule for outliers finds, whom it misses, and why.
+#     asks: Which samples do not show the distance that people keep?
+#     needs:
+#     - '02'
+#     exercises:
+#     - 2.1-2.5
+#     week: 1
 # ---
 
 # %% [markdown]

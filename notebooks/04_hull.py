@@ -9,6 +9,17 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: hull
+#     paper: sec. 2, fig. 4b
+#     aim: turn samples into a hull, cut it at a speed, and enclose the zone in the smallest ellipse.
+#     asks: How near did people come, in each direction, at each speed?
+#     needs:
+#     - '03'
+#     exercises:
+#     - 3.1-3.3
+#     - '4.2'
+#     week: 2
 # ---
 
 # %% [markdown]
@@ -45,6 +56,7 @@ import warnings
 
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 from IPython.display import Markdown
 from scipy.spatial import ConvexHull
 from studies import real_day
@@ -77,7 +89,7 @@ zone = szlib.SocialZone.fit(samples, method="paper", **fit)
 points = np.column_stack([outliers.complementary_points(inliers, r_max=r_max), inliers["speed"]])
 fig = plt.figure(figsize=(11, 4.1), layout="constrained")
 left, right = fig.add_subplot(1, 2, 1, projection="3d"), fig.add_subplot(1, 2, 2)
-figures.plot_hull(zone, list(zone.ellipses), points=points, ax=left)
+plots.plot_hull(zone, list(zone.ellipses), points=points, ax=left)
 left.set_title(
     "One hull around all samples, cut at four speeds" if len(zone.ellipses) == 4 else "Hull and slices"
 )

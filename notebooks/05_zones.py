@@ -9,6 +9,17 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: zones
+#     paper: sec. 2, fig. 5
+#     aim: estimate a zone that does not shrink with more data, and say how far to trust it.
+#     asks: Which zone should a robot keep, and how far can it be trusted?
+#     needs:
+#     - '04'
+#     exercises:
+#     - 3.4-3.5
+#     - '4.1'
+#     week: 2
 # ---
 
 # %% [markdown]

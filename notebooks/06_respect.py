@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: respect
+#     paper: sec. 2
+#     aim: tell respect from emptiness by a null model.
+#     asks: Do people avoid each other, or do they rarely meet?
+#     needs:
+#     - '05'
+#     exercises:
+#     - 4.3-4.5
+#     week: 2
 # ---
 
 # %% [markdown]
@@ -42,6 +52,7 @@ import warnings
 
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 from IPython.display import Markdown
 from studies import real_day, respect
 
@@ -200,7 +211,9 @@ record.figure(fig, "test")
 # Checks, and the answer
 for name, each in tests.items():
     record.key[f"p-value, {name}"] = each.p_value
-record.claim("people keep out of each other's way more than by chance", found, str(test))
+where = "; a busier plaza than that of the zone" if is_plaza else ""
+least = f"1/{shifts + 1} is the least p that {shifts} shifts allow{where}"
+record.claim("people keep out of each other's way more than by chance", found, f"{test}; {least}")
 Markdown(
     f"""<details><summary>Answer</summary>
 
@@ -390,7 +403,7 @@ names = {"atc-1hz": "ATC day", "grand-central": "Grand Central"}
 for ax, (site, part) in zip(panels, curves.groupby("site"), strict=True):
     start, end = part["hull_a"].iloc[[0, -1]]
     title = f"{names[site]}: the hull shrinks from {start:.2f} to {end:.2f} m"
-    figures.plot_zone_sizes(part, shown, ax=ax).set_title(title)
+    plots.plot_zone_sizes(part, shown, ax=ax).set_title(title)
     ax.set_xticks([n for n in (36, 72, 150, 600, 2400) if n <= part["encounters"].max()])
     ax.xaxis.set_major_formatter("{x:.0f}")
     ax.minorticks_off()

@@ -9,6 +9,17 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: barriers
+#     paper: sec. 3, eq. 1-7
+#     aim: turn a distance into a condition on the next step, and say what gamma does.
+#     asks: How does a controller obey "stay out"? How is it built, line by line?
+#     needs:
+#     - '05'
+#     exercises:
+#     - 5.1-5.5
+#     - '6.1'
+#     week: 3
 # ---
 
 # %% [markdown]

@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: build a controller
+#     paper: sec. 3-4, eq. 1-2, 8
+#     aim: write an MPC-CBF yourself, and say what each of its terms is there for.
+#     row: '07'
+#     needs:
+#     - '07'
+#     exercises:
+#     - 7.1-7.8
+#     week: 4
 # ---
 
 # %% [markdown]

@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: passing
+#     paper: sec. 4, fig. 6a
+#     aim: say when the robot begins to avoid a person, and what chooses the side.
+#     asks: When does the robot avoid a standing person? Does it slow down in a corridor?
+#     needs:
+#     - '07'
+#     exercises:
+#     - '6.2'
+#     week: 5
 # ---
 
 # %% [markdown]

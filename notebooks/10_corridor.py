@@ -9,6 +9,14 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: corridor
+#     paper: sec. 4, fig. 6b
+#     aim: say why the robot slows down in a corridor, and speeds up beside the person.
+#     row: 09
+#     needs:
+#     - 09
+#     week: 5
 # ---
 
 # %% [markdown]

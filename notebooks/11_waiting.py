@@ -9,6 +9,18 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: yielding
+#     paper: sec. 4, fig. 6c-d
+#     aim: say why the robot waits, and why it backs out of a passage, although no rule tells it
+#       to.
+#     asks: Who goes first in a narrow passage? What if the robot is in the way?
+#     needs:
+#     - '10'
+#     exercises:
+#     - '6.4'
+#     - '6.6'
+#     week: 6
 # ---
 
 # %% [markdown]

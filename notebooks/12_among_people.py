@@ -9,6 +9,16 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: among people
+#     paper: sec. 4-5
+#     aim: choose settings for a robot among people and walls, and say where it will not arrive.
+#     asks: How does the robot do among walls and many people? What does it do if you drag the person?
+#     needs:
+#     - 09
+#     exercises:
+#     - '6.5'
+#     week: 6
 # ---
 
 # %% [markdown]
@@ -45,6 +55,7 @@ from heapq import heappop, heappush
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 import shapely
 from IPython.display import Markdown, display
 
@@ -247,14 +258,14 @@ steps = {
 }
 fig, panels = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
 for ax, (name, step) in zip(panels, steps.items(), strict=True):
-    figures.plot_ways(replace(step, ways=()), ax).set(ylim=(-4.5, 8.5), title=name)
+    plots.plot_ways(replace(step, ways=()), ax).set(ylim=(-4.5, 8.5), title=name)
 record.figure(fig, "before")
 
 # %% jupyter={"source_hidden": true}
 # Figure
 fig, panels = plt.subplots(1, 3, figsize=(11, 4.6), layout="constrained")
 for ax, (name, step) in zip(panels, steps.items(), strict=True):
-    figures.plot_ways(step, ax).set(ylim=(-4.5, 8.5))
+    plots.plot_ways(step, ax).set(ylim=(-4.5, 8.5))
     ax.set_title(f"{name}: {ax.get_title()}")
     ax.get_legend().set_bbox_to_anchor((0.5, -0.2), ax.transAxes)
 record.figure(fig, "ways")

@@ -9,6 +9,14 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: laboratory
+#     paper: sec. 3-4
+#     aim: try out a scene of your own, live, and hand its settings on.
+#     row: '12'
+#     needs:
+#     - '07'
+#     week: 6
 # ---
 
 # %% [markdown]

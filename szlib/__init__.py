@@ -7,4 +7,17 @@ import lazy_loader as lazy
 
 __version__ = "0.2.0"
 
-__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)
+_load, __dir__, __all__ = lazy.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    """Import a name when it is first used; the error of a missing package says which extra has it."""
+    try:
+        return _load(name)
+    except ModuleNotFoundError as error:
+        if (error.name or "szlib").startswith("szlib"):
+            raise
+        advice = "pip install 'szlib[data]' reads tracks and fits zones, 'szlib[workbook]' draws"
+        raise ModuleNotFoundError(
+            f"szlib.{name} needs {error.name}: {advice}", name=error.name
+        ) from error

@@ -91,7 +91,7 @@ def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     """Run the cells of notebooks in this process, to test what a run does around them."""
     import jupytext
 
-    from szlib.workbook import notebook_execution
+    from szlib.workbook import execution
 
     def run_cells(
         script: Path, given: dict[str, Any], folder: Path, environment: dict[str, str]
@@ -111,4 +111,4 @@ def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
         finally:
             jupytext.write(notebook, folder / f"{script.stem}.ipynb")
 
-    monkeypatch.setattr(notebook_execution, "run_cells", run_cells)
+    monkeypatch.setattr(execution, "run_cells", run_cells)

@@ -29,6 +29,8 @@ def module_names() -> Iterator[str]:
         if path.name != "__main__.py":
             parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
             yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    for path in sorted((PACKAGE.parent / "notebooks" / "plots").glob("[!_]*.py")):
+        yield f"plots.{path.stem}"
 
 
 MODULES = list(module_names())

@@ -9,6 +9,15 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: feasibility
+#     paper: sec. 4
+#     aim: say when a step has no solution, and prove when there always is one.
+#     asks: When is no safe choice left? Is the margin of the approximate distances enough?
+#     needs:
+#     - 08
+#     exercises:
+#     - '6.3'
 # ---
 
 # %% [markdown]
@@ -43,13 +52,14 @@ n_jobs = 1
 # Imports
 import sys
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 from dataclasses import replace
 from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from studies import feasibility, rollout_table
 from studies.distances import euclidean_to_segment
@@ -82,7 +92,7 @@ def draw_map(what: str, worst: float) -> plt.Figure:
     fig, panels = plt.subplots(1, 3, figsize=(12, 3.6), layout="constrained", sharey=True)
     for ax, (a_max, part) in zip(panels, full.groupby("a_max"), strict=True):
         table = part.pivot(index="N_h", columns="gamma", values=what)
-        figures.plot_sweep(table.rename_axis(index="", columns=""), worst=worst, ax=ax)
+        plots.plot_sweep(table.rename_axis(index="", columns=""), worst=worst, ax=ax)
         ax.set_title(f"brakes of {a_max:g} m/s²", fontsize=11)
         enough = np.log2(a_max * settings.dt / settings.v_max / table.columns[0])  # gammas double
         ax.axvline(enough + 0.5, color=figures.BLUE, linestyle="--", linewidth=2)

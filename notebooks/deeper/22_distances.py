@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: distances
+#     paper: sec. 3, eq. 3-7
+#     aim: say where the two distances err, and which margin makes up for it.
+#     row: '21'
+#     needs:
+#     - '07'
 # ---
 
 # %% [markdown]

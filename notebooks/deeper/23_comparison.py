@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: comparison
+#     paper: sec. 1, 5
+#     aim: compare zones and controllers in the same worlds, with intervals.
+#     asks: What would a circle, or no zone, have done in the same worlds?
+#     needs:
+#     - 09
 # ---
 
 # %% [markdown]
@@ -40,11 +47,12 @@ n_jobs = 1
 # Imports
 import sys
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from studies import comparison, literature_zones
 from studies.literature_zones import ZONES, compare
@@ -157,7 +165,7 @@ title = (
     f"{inside['equal circle']:.1f} s with the circle, {inside['fitted']:.1f} s with the fitted one (szlib)"
 )
 expected = full[full["behaviour"] == "as expected"]
-fig = figures.draw_interval_grid(expected, labels, rows="zone", colour="formulation", title=title)
+fig = plots.draw_interval_grid(expected, labels, rows="zone", colour="formulation", title=title)
 record.figure(fig, "zones-and-formulations")
 
 # %% [markdown]
@@ -237,7 +245,7 @@ title = (
     f"positions 10 cm off make it jerk {jerk['seen 10 cm off'] / jerk['as expected']:.0f} times as much"
 )
 options = {"rows": "behaviour", "colour": "formulation", "columns": 2, "title": title}
-fig = figures.draw_interval_grid(surprised, more_labels, **options)
+fig = plots.draw_interval_grid(surprised, more_labels, **options)
 record.figure(fig, "surprises")
 
 # %% [markdown]

@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: data quality
+#     paper: sec. 2
+#     aim: judge whether a file of tracks can be used, and find days unlike the others.
+#     asks: Can a file of tracks be trusted? How are 92 days processed?
+#     needs:
+#     - '03'
 # ---
 
 # %% [markdown]
@@ -38,13 +45,14 @@ exclude = []
 # Imports
 import sys
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 from itertools import cycle
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from studies import hours as hours_study
 
@@ -84,7 +92,7 @@ zone = options.tz or find_format(files[0], options).tz  # of the clock: that of 
 both = seconds.dropna(subset=["sensor_speed", "moved"])
 if len(both):
     fig, ax = plt.subplots(figsize=(8, 3.6), layout="constrained")
-    figures.plot_speed_histogram(both["sensor_speed"].to_numpy(), both["moved"].to_numpy(), ax=ax)
+    plots.plot_speed_histogram(both["sensor_speed"].to_numpy(), both["moved"].to_numpy(), ax=ax)
     slow = both.loc[both["moved"] < quality.STANDING, "sensor_speed"].median()
     ax.set_title(f"The file's velocity column gives {slow:.2f} m/s to people who stand still")
     ax.legend(loc="upper right")
@@ -247,7 +255,7 @@ samples = extraction.samples()
 # %% jupyter={"source_hidden": true}
 # Figure
 stages = funnels.get(samples)
-ax = figures.plot_funnel(funnels.table(stages))
+ax = plots.plot_funnel(funnels.table(stages))
 n_encounters = samples["encounter"].nunique()
 read = [stage for stage in stages if stage["stage"].startswith("read ")]
 rows = sum(stage["entered"] for stage in read)

@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: claims
+#     paper: all
+#     aim: say which claims of the paper the data supports, and with which interval.
+#     asks: Which claims and which sentences of the paper does data support?
+#     needs:
+#     - '06'
 # ---
 
 # %% [markdown]
@@ -41,7 +48,7 @@ resamples = 200  # for the intervals
 # Imports
 import sys
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 import contextlib
 import io
 import warnings
@@ -53,6 +60,7 @@ from time import thread_time
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from studies import claims as claims_study
 from studies import imposed as imposed_study
@@ -136,7 +144,7 @@ table = claims.tabulate_findings(found, data=record.out.name).assign(method=meth
 # Figure
 UNITS = {"share": "share of pairs - 0.5", "m": "reach ahead - reach behind [m]"}
 UNITS |= {"m2": "area at 1.3 m/s - area at 0.7 m/s [m²]"}
-fig = figures.draw_claims(
+fig = plots.draw_claims(
     table.replace({"unit": UNITS}),
     title=f"{(table['verdict'] == 'supported').sum()} of {len(table)} claims are supported by this data: "
     "the interval lies to the right of 0",
@@ -445,7 +453,7 @@ radii = read_table("06_sites").query("kinds == 'strangers' and site != 'plaza'")
 radii = radii.rename({"atc-1hz": "ATC mall", "grand-central": "Grand Central"})
 sites = {name: tuple(row) for name, row in radii[["radius", "radius_low", "radius_high"]].iterrows()}
 pooled = szlib.pool(sites)
-ax = figures.plot_forest(pooled)
+ax = plots.plot_forest(pooled)
 ax.set(xlim=(0.4, 2), xlabel="radius that strangers respect [m], with 95 % intervals")
 ax.set_xticks([0.5, 0.75, 1, 1.5, 2], ["0.5", "0.75", "1", "1.5", "2"])
 mall, station = (value for value, *_ in sites.values())
@@ -515,7 +523,7 @@ shown = {"this data, the paper's zone": moved, "ATC day, quantile zone": of_day[
 fig, panels = plt.subplots(1, 2, figsize=(12, 5), layout="constrained")
 for ax, (name, part) in zip(panels, shown.items(), strict=True):
     plain = part.replace({"parameter": PLAIN})
-    figures.plot_sensitivity(plain, ax=ax)
+    plots.plot_sensitivity(plain, ax=ax)
     what, much = find_strongest(part)
     ax.set_title(f"{name}: {much:.0f} % by the\n{what}")
 fig.suptitle("Which parameter moves the area of the zone most")

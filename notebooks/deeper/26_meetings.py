@@ -9,6 +9,14 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: meetings
+#     paper: sec. 4-5
+#     aim: say in which meetings this controller is good, and in which it is bad.
+#     asks: How does the robot do in eleven standard meetings, with other gammas, widths, speeds
+#       and zones, and in crowds?
+#     needs:
+#     - '12'
 # ---
 
 # %% [markdown]

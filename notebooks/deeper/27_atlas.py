@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: atlas
+#     paper: sec. 4-5
+#     aim: predict from gamma, width, speed and zone what the robot will do.
+#     row: '26'
+#     needs:
+#     - '11'
 # ---
 
 # %% [markdown]
@@ -41,9 +48,10 @@ n_jobs = 1
 # Imports, and the record of the run
 import sys
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 from IPython.display import Markdown
 from studies.atlas import REFERENCE, SCENES, AtlasCell, run_atlas
 
@@ -70,7 +78,7 @@ found = [name for name in STRATEGIES if (atlas["strategy"] == name).any()]
 corridor = atlas[atlas["scene"] == "corridor"]
 usual = corridor[(corridor["pace"] == 0.5) & (corridor["size"] == 1)]
 fig, ax = plt.subplots(figsize=(8, 3.9), layout="constrained")
-figures.plot_strategies(usual, names=found, rows="gamma", columns="width", ax=ax)
+plots.plot_strategies(usual, names=found, rows="gamma", columns="width", ax=ax)
 ax.set(xlabel="width of the corridor [m]", ylabel="gamma")
 has_no_plan = usual["strategy"].isin(["h < 0", "infeasible"]).groupby(usual["gamma"]).all()
 limit = has_no_plan.index[has_no_plan].min()
@@ -125,7 +133,7 @@ sizes, paces = sorted(corridor["size"].unique()), sorted(corridor["pace"].unique
 fig, grid = plt.subplots(4, 4, figsize=(11, 9), layout="constrained", sharex=True, sharey=True)
 for (size, pace), part in corridor.groupby(["size", "pace"]):
     ax = grid[sizes.index(size), paces.index(pace)]
-    figures.plot_strategies(part, names=found, rows="gamma", columns="width", ax=ax)
+    plots.plot_strategies(part, names=found, rows="gamma", columns="width", ax=ax)
     ax.set(xlabel="", ylabel="")
     ax.set_xticks(range(0, 7, 2), ["3", "3.8", "4.6", "6.4"])
 for ax, pace in zip(grid[0], paces, strict=True):
@@ -158,7 +166,7 @@ fig, grid = plt.subplots(2, 4, figsize=(11, 5), layout="constrained", sharex=Tru
 for row, scene in zip(grid, ("waiting", "making_room"), strict=True):
     part = atlas[(atlas["scene"] == scene) & (atlas["pace"] == 0.5)]
     for ax, (size, cells) in zip(row, part.groupby("size"), strict=True):
-        figures.plot_strategies(cells, names=found, rows="gamma", columns="width", ax=ax)
+        plots.plot_strategies(cells, names=found, rows="gamma", columns="width", ax=ax)
         ax.set(title=f"zone x {size:g}" if scene == "waiting" else "", xlabel="", ylabel="")
     row[0].set_ylabel(f"{scene.replace('_', ' ')}\ngamma")
 for ax in grid[-1]:

@@ -9,6 +9,11 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: sentences
+#     paper: all
+#     aim: find each sentence of the paper with its code, its cell and its verdict.
+#     row: '25'
 # ---
 
 # %% [markdown]

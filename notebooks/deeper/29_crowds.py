@@ -9,6 +9,13 @@
 #     display_name: Python 3 (ipykernel)
 #     language: python
 #     name: python3
+#   szlib:
+#     label: crowds
+#     paper: sec. 4-5
+#     aim: say which safety claims of the controller hold among people who react.
+#     row: '26'
+#     needs:
+#     - '12'
 # ---
 
 # %% [markdown]
@@ -42,10 +49,11 @@ import sys
 from dataclasses import replace
 from importlib.util import find_spec
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown, display
 from studies import crowd_trials, differential_table, replay, walkers
 from studies.safety_claims import MOTION_CHANGES, safety_violations
@@ -166,7 +174,7 @@ labels = {
 }
 seen = reacting[(reacting["sees"] == "robot") & reacting["controller"].isin(shown)]
 title = "Among people who react, MPC-CBF with its defaults stays out of zones, and takes the longest"
-fig = figures.draw_interval_grid(seen, labels, rows="crowd", colour="controller", title=title)
+fig = plots.draw_interval_grid(seen, labels, rows="crowd", colour="controller", title=title)
 record.figure(fig, "reacting")
 
 # %% jupyter={"source_hidden": true}
@@ -248,7 +256,7 @@ record.check(
 # %% jupyter={"source_hidden": true}
 # Figure
 by_crowd = promises[promises["controller"] == "MPC-CBF"].groupby("crowd", sort=False).sum(numeric_only=True)
-ax = figures.plot_safety_claims(by_crowd[[*MOTION_CHANGES, "claimed_safe_steps"]])
+ax = plots.plot_safety_claims(by_crowd[[*MOTION_CHANGES, "claimed_safe_steps"]])
 ax.set_title("szlib's defaults: people break claims by appearing and turning")
 record.figure(ax.figure, "promises")
 
@@ -324,7 +332,7 @@ of_ways = {
     "jerk": "mean squared jerk [m²/s⁶]",
 }
 title = "Among recorded people, at up to 1 m/s: among_people() arrives, and stays out of most zones"
-fig = figures.draw_interval_grid(at_one, of_ways, rows="crowd", colour="controller", columns=2, title=title)
+fig = plots.draw_interval_grid(at_one, of_ways, rows="crowd", colour="controller", columns=2, title=title)
 record.figure(fig, "sites")
 
 # %% jupyter={"source_hidden": true}

@@ -1,18 +1,23 @@
-"""Write the navigation cell of every notebook, the routes in 00_start_here, and lists in reference.md.
+"""Write the navigation cell of every notebook, the routes in 00, and the tables of README.md and reference.md.
 
     python notebooks/tools/course.py
 
-Titles, questions and reading times come from the notebooks. What a reader learns from each notebook, and the
-glossary, are in this file. A test checks that the cells in the notebooks are up to date.
+Titles, questions and reading times come from the notebooks. The rest is in the front matter of each notebook, `szlib`
+in the header of its script: label, the section of the paper, aim (what a reader can do afterwards), needs (the chapters
+that it builds on), exercises, week, asks (its question in the README) or row (the chapter whose row there it shares).
+The words are in glossary.toml. A test checks that everything is up to date.
 """
 
 import math
 import os
 import re
 import textwrap
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import jupytext
 import nbformat
@@ -21,7 +26,7 @@ from szlib.workbook import folders
 
 HERE = Path(__file__).parents[1]
 START = "00_start_here"
-REFERENCE = HERE / "reference.md"
+REFERENCE, README = HERE / "reference.md", HERE.parent / "README.md"
 PAPER = "https://arxiv.org/abs/2405.15101"
 WORDS, LINES = 120, 8
 """Words of prose, and lines of visible code, that are read in a minute (assumed)."""
@@ -33,176 +38,24 @@ RULED = re.compile(r"^\|[ :|-]+\|$", re.MULTILINE)
 """The line below the header of a Markdown table."""
 TASK = re.compile(r"^# ## ((\d\.\d) .*\b(\d+) min\))$", re.MULTILINE)
 """The heading of a task in an exercise sheet."""
+TABLE = re.compile(r"^\| notebook \| question \|\n(?:\|.*\n)*\|.*", re.MULTILINE)
+"""The table of notebooks in the README."""
 HEADING = "**Afterwards you can** "
 
-GIVES: dict[str, tuple[str, str]] = {
-    "00": ("all", "choose a route, and take the first step."),
-    "01": ("sec. 2, fig. 1", "bring files of tracks to one clock, and say where two people can be watched."),
-    "02": ("sec. 2, fig. 2-3", "say when two people meet alone, and compute where one sees the other."),
-    "03": ("sec. 2, fig. 4a", "say whom a rule for outliers finds, whom it misses, and why."),
-    "04": (
-        "sec. 2, fig. 4b",
-        "turn samples into a hull, cut it at a speed, and enclose the zone in the smallest ellipse.",
-    ),
-    "05": (
-        "sec. 2, fig. 5",
-        "estimate a zone that does not shrink with more data, and say how far to trust it.",
-    ),
-    "06": ("sec. 2", "tell respect from emptiness by a null model."),
-    "07": ("sec. 3, eq. 1-7", "turn a distance into a condition on the next step, and say what gamma does."),
-    "08": (
-        "sec. 3-4, eq. 1-2, 8",
-        "write an MPC-CBF yourself, and say what each of its terms is there for.",
-    ),
-    "09": ("sec. 4, fig. 6a", "say when the robot begins to avoid a person, and what chooses the side."),
-    "10": ("sec. 4, fig. 6b", "say why the robot slows down in a corridor, and speeds up beside the person."),
-    "11": (
-        "sec. 4, fig. 6c-d",
-        "say why the robot waits, and why it backs out of a passage, although no rule tells it to.",
-    ),
-    "12": (
-        "sec. 4-5",
-        "choose settings for a robot among people and walls, and say where it will not arrive.",
-    ),
-    "13": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
-    "21": ("sec. 4", "say when a step has no solution, and prove when there always is one."),
-    "22": ("sec. 3, eq. 3-7", "say where the two distances err, and which margin makes up for it."),
-    "23": ("sec. 1, 5", "compare zones and controllers in the same worlds, with intervals."),
-    "24": ("sec. 2", "judge whether a file of tracks can be used, and find days unlike the others."),
-    "25": ("all", "say which claims of the paper the data supports, and with which interval."),
-    "26": ("sec. 4-5", "say in which meetings this controller is good, and in which it is bad."),
-    "27": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
-    "28": ("all", "find each sentence of the paper with its code, its cell and its verdict."),
-    "29": ("sec. 4-5", "say which safety claims of the controller hold among people who react."),
-}
-"""By number of the notebook: the section of the paper, and what a reader can do after reading it."""
-NEEDS: dict[str, str] = {
-    "02": "01", "03": "02", "04": "03", "05": "04", "06": "05", "07": "05", "08": "07", "09": "07", "10": "09",
-    "11": "10", "12": "09", "13": "07", "21": "08", "22": "07", "23": "09", "24": "03", "25": "06", "26": "12",
-    "27": "11", "29": "12",
-}  # fmt: skip
-"""By number of the notebook: the chapter that it builds on."""
-EXERCISES: dict[str, tuple[str, ...]] = {
-    "01": ("1.1", "1.4-1.5"),
-    "02": ("1.2-1.3",),
-    "03": ("2.1-2.5",),
-    "04": ("3.1-3.3", "4.2"),
-    "05": ("3.4-3.5", "4.1"),
-    "06": ("4.3-4.5",),
-    "07": ("5.1-5.5", "6.1"),
-    "08": ("7.1-7.8",),
-    "09": ("6.2",),
-    "11": ("6.4", "6.6"),
-    "12": ("6.5",),
-    "21": ("6.3",),
-}
-"""By number of the notebook: the tasks of the exercise sheets that belong to it."""
+GLOSSARY: dict[str, dict[str, Any]] = tomllib.loads((HERE / "glossary.toml").read_text(encoding="utf-8"))
 LABORATORY, FIRST_SCENE = "13", "07"
 """The laboratory, and the first chapter that links to it."""
 
 
-@dataclass(frozen=True)
-class Word:
-    """A word of the glossary.
-
-    Parameters
-    ----------
-    means : the meaning.
-    pattern : regular expression that finds the word in a text; empty: the word itself.
-    new : whether the navigation of the first notebook that uses the word explains it.
-    """
-
-    means: str
-    pattern: str = ""
-    new: bool = True
-
-
-GLOSSARY: dict[str, Word] = {
-    "ATC": Word("a shopping mall in Osaka whose visitors were tracked on 92 days", new=False),
-    "attentional space": Word("the 4 m by 5 m ahead of a person in which others are counted", new=False),
-    "barrier function": Word(
-        "h: positive where the robot may be, 0 at the edge, negative where it must not be",
-        "barrier",
-        new=False,
-    ),
-    "bootstrap": Word(
-        "draw people from the data at random, with repetition, and estimate again: how far a result moves"
-    ),
-    "companions": Word("two people who walk together", "companions out", new=False),
-    "class K": Word(
-        "of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma times h",
-        r"class[ -](K\b|\$\\mathcal)|eq\. 1\b",
-    ),
-    "CBF-QP": Word("a quadratic program for one step: as near to the wanted control as the barrier allows"),
-    "complementary distance": Word("r' = r_max - r, large for a person who is near", new=False),
-    "EWAP": Word("the walking pedestrians recorded at ETH Zürich, and the format of their files, `obsmat`"),
-    "encounter": Word(
-        "3 s in which two people meet, and nobody else is in the attentional space",
-        "An \\*encounter",
-        new=False,
-    ),
-    "exact penalty": Word(
-        "a price on violations so high that none is paid where a solution without violations exists"
-    ),
-    "funnel": Word("a count of the rows that came in and went on, and why the others did not", new=False),
-    "horizon": Word(
-        "the number of steps that a plan looks ahead, N, or that obey the barrier, N_h", new=False
-    ),
-    "hull": Word("the smallest convex body around points", "convex hull", new=False),
-    "infeasible": Word(
-        "of a step: no plan obeys all rows, so one that violates them least is taken, and flagged"
-    ),
-    "IPOPT": Word("the solver for nonlinear optimisation that the paper uses", r"\bIPOPT\b|settings_table\("),
-    "jerk": Word("the change of acceleration by time"),
-    "line-of-sight angle": Word(
-        "LOS: where the other person is, seen from the reference pedestrian", r"line.of.sight", new=False
-    ),
-    "LOF": Word(
-        "local outlier factor: how isolated a sample is, compared with its neighbours", r"\bLOF\b", new=False
-    ),
-    "MPC": Word("model predictive control: plan some steps ahead, take the first, plan again", r"\bMPC\b"),
-    "null model": Word("the same people, each moved in time, so that they ignore each other", new=False),
-    "ORCA": Word(
-        "a model of walking: each of two people takes half of what keeps them apart", r"\b(ORCA|orca)\b"
-    ),
-    "plaza": Word("synthetic people whose zone is known, to test the method", r"\bplaza\b", new=False),
-    "precision, recall": Word(
-        "the share of intruders among what was removed; the share of the intruders that was removed",
-        "precision",
-        new=False,
-    ),
-    "quantile zone": Word("the zone that, in each direction, a share q of the encounters enters", new=False),
-    "reference pedestrian": Word("the person of an encounter from whom we look at the other"),
-    "respect zone": Word(
-        "the ellipse that careful people keep out of, compared with people who ignore each other", new=False
-    ),
-    "guard": Word(
-        "a check before a control is applied, that the robot can still stop before every wall", r"\bguard\b"
-    ),
-    "priority": Word(
-        "what a plan obeys first if it cannot obey all: walls, then bodies, then zones, then decay",
-        r"\bpriorit(y|ies)\b",
-    ),
-    "slack": Word("by how much a row is violated"),
-    "social force": Word("people who are pushed by others and by walls, and drawn to their goal", new=False),
-    "SQP": Word(
-        "sequential quadratic programming: solve quadratic problems in a row, each around the last answer",
-        r"\bSQP\b|settings_table\(",
-    ),
-    "tidy": Word("of a table: one row for each observation, one column for each quantity", r"\btidy\b"),
-    "window": Word("the 3 s for which two people are watched", new=False),
-}
-"""The words that the notebooks use, and their meanings."""
-
-WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
-    ("Tracks, encounters, and which of them to believe", ("01", "02", "03"), ("1.1-1.5", "2.1-2.5")),
-    ("From samples to a zone; respect or emptiness", ("04", "05", "06"), ("3.1-3.3", "4.1-4.5")),
-    ("A zone of your own, and a barrier around it", ("07",), ("3.4-3.5", "6.1")),
-    ("A controller of your own", ("08",), ("5.1-5.5", "7.1-7.3")),
-    ("MPC with barriers, and the first meetings", ("09", "10"), ("7.4-7.8",)),
-    ("The robot yields, and drives among people", ("11", "12", "13"), ("6.2-6.6",)),
+TASKS: list[tuple[str, tuple[str, ...]]] = [
+    ("Tracks, encounters, and which of them to believe", ("1.1-1.5", "2.1-2.5")),
+    ("From samples to a zone; respect or emptiness", ("3.1-3.3", "4.1-4.5")),
+    ("A zone of your own, and a barrier around it", ("3.4-3.5", "6.1")),
+    ("A controller of your own", ("5.1-5.5", "7.1-7.3")),
+    ("MPC with barriers, and the first meetings", ("7.4-7.8",)),
+    ("The robot yields, and drives among people", ("6.2-6.6",)),
 ]
-"""Topic, chapters and tasks of the exercise sheets of each of six weeks."""
+"""Topic, and tasks of the exercise sheets, of each week; its chapters say so themselves."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [
     ("The idea", ("05", "07", "10", "13")),
     ("The method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "12")),
@@ -215,10 +68,11 @@ ROUTES: list[tuple[str, tuple[str, ...]]] = [
 
 @dataclass(frozen=True)
 class Page:
-    """A notebook or an exercise sheet: its script and its cells."""
+    """A notebook or an exercise sheet: its script, its cells, and its front matter."""
 
     source: Path
     cells: tuple[nbformat.NotebookNode, ...]
+    front: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def number(self) -> str:
@@ -285,7 +139,8 @@ def pages() -> list[Page]:
 
 
 def _page(source: Path) -> Page:
-    return Page(source, tuple(jupytext.read(source).cells))
+    notebook = jupytext.read(source)
+    return Page(source, tuple(notebook.cells), notebook.metadata.get("szlib", {}))
 
 
 def first_uses(story: list[Page]) -> dict[str, str]:
@@ -297,7 +152,8 @@ def first_uses(story: list[Page]) -> dict[str, str]:
         code = [cell.source for cell in page.cells if cell.cell_type == "code"]
         text = " ".join(" ".join([*page.prose, *code]).split())
         for word, entry in GLOSSARY.items():
-            if re.search(entry.pattern or rf"\b{re.escape(word)}\b", text, 0 if word[:2].isupper() else re.I):
+            pattern = entry.get("pattern", rf"\b{re.escape(word)}\b")
+            if re.search(pattern, text, 0 if word[:2].isupper() else re.I):
                 found.setdefault(word, page.number)
     return found
 
@@ -314,18 +170,18 @@ def make_navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
     places = [f"[Start]({'' if page.is_chapter else '../'}{START}.ipynb)"] if at > 1 else []
     places += [f"before: {_number_link(each, page)}" for each in before[-1:]]
     places += [f"next: {_link(each, page)}" for each in after[:1]]
-    section, aim = GIVES[page.number]
-    places += [f"[paper]({PAPER}): {section}", f"{page.minutes} min"]
-    places += [f"needs {_number_link(p, page)}" for p in story if p.number == NEEDS.get(page.number)]
-    tasks = [_task_link(each, page) for each in EXERCISES.get(page.number, ())]
+    places += [f"[paper]({PAPER}): {page.front['paper']}", f"{page.minutes} min"]
+    places += [f"needs {_number_link(p, page)}" for p in story if p.number in page.front.get("needs", ())]
+    tasks = [_task_link(each, page) for each in page.front.get("exercises", ())]
     places += [f"exercises: {', '.join(tasks)}"] if tasks else []
     if page.is_chapter and FIRST_SCENE <= page.number < LABORATORY:
         places += [f"laboratory: {_number_link(p, page)}" for p in after if p.number == LABORATORY]
     new = sorted(
-        (word for word, number in uses.items() if number == page.number and GLOSSARY[word].new), key=str.lower
+        (word for word, number in uses.items() if number == page.number and GLOSSARY[word].get("new", True)),
+        key=str.lower,
     )
-    words = "; ".join(f"*{word}*: {GLOSSARY[word].means}" for word in new)
-    gives = f"{HEADING}{aim}" + (f" **Words.** {words}." if new else "")
+    words = "; ".join(f"*{word}*: {GLOSSARY[word]['means']}" for word in new)
+    gives = f"{HEADING}{page.front['aim']}" + (f" **Words.** {words}." if new else "")
     return f"{_wrapped(' · '.join(places))}\n\n{_wrapped(gives)}"
 
 
@@ -339,7 +195,7 @@ def make_sheet_navigation(name: str) -> str:
     places += [f"[to do](../exercises/{name}.ipynb)", f"[solved](../solutions/{name}.ipynb)"]
     places += [_time(sum(minutes for sheet, _, minutes in tasks().values() if sheet == name))]
     here = _page(HERE / "solutions" / f"{name}.py")
-    owners = [p for p in pages() if any(each[0] == name[5] for each in EXERCISES.get(p.number, ()))]
+    owners = [p for p in pages() if any(each[0] == name[5] for each in p.front.get("exercises", ()))]
     places += [f"belongs to {', '.join(_number_link(each, here) for each in owners)}"]
     return _wrapped(" · ".join(places))
 
@@ -394,6 +250,24 @@ def make_map(story: list[Page]) -> str:
     return "\n".join(rows)
 
 
+def weeks(story: list[Page]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+    """Topic, chapters and tasks of the exercise sheets of each week."""
+    return [
+        (topic, tuple(page.number for page in story if page.front.get("week") == week), ranges)
+        for week, (topic, ranges) in enumerate(TASKS, 1)
+    ]
+
+
+def make_table(story: list[Page]) -> str:
+    """The table of the README: a row for each notebook that asks a question, with those that share the row."""
+    lines = ["| notebook | question |", "|---|---|"]
+    for page in (page for page in story if "asks" in page.front):
+        sharing = [each for each in story if each.front.get("row") == page.number]
+        names = [f"[{p.number} {p.front['label']}](notebooks/{_path(p, story[0])})" for p in [page, *sharing]]
+        lines.append(f"| {', '.join(names)} | {page.front['asks']} |")
+    return "\n".join(lines)
+
+
 def make_routes(story: list[Page]) -> str:
     """The cell of 00 with the three routes."""
     rows = ["## Three routes", ""]
@@ -404,7 +278,7 @@ def make_routes(story: list[Page]) -> str:
         "- **The course, in six weeks.** Reading and exercises; running and looking around come on top."
     )
     rows += ["", "| week | topic | notebooks | to read | exercises | to do |", "|---|---|---|---|---|---|"]
-    for week, (topic, numbers, ranges) in enumerate(WEEKS, 1):
+    for week, (topic, numbers, ranges) in enumerate(weeks(story), 1):
         links, minutes = _links_and_time(story, numbers)
         work = _time(sum(tasks()[each][2] for part in ranges for each in expand(part)))
         to_do = ", ".join(_task_link(each, story[0]) for each in ranges)
@@ -431,7 +305,7 @@ def make_glossary(story: list[Page], uses: dict[str, str]) -> str:
     rows = ["## Words", "", "| word | meaning | first used in |", "|---|---|---|"]
     for word in sorted(uses, key=str.lower):
         page = by_number[uses[word]]
-        rows.append(f"| {word} | {GLOSSARY[word].means} | {_number_link(page, story[0])} |")
+        rows.append(f"| {word} | {GLOSSARY[word]['means']} | {_number_link(page, story[0])} |")
     return "\n".join(rows)
 
 
@@ -473,6 +347,8 @@ def make_scripts() -> dict[Path, str]:
     scripts[REFERENCE] = REFERENCE.read_text(encoding="utf-8")
     for section in (make_map(story), make_glossary(story, uses)):
         scripts[REFERENCE] = replace_section(scripts[REFERENCE], section)
+    readme = README.read_text(encoding="utf-8")
+    scripts[README] = TABLE.sub(lambda _: make_table(story), readme)
     routes = {"## Three routes": make_routes(story)}
     for page in story:
         own = routes if page.source.stem == START else {}

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from .. import memory
+from ..core import memory
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
 from ..tracks.formats import TrackFormat, find_format, open_file

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .. import memory
+from ..core import memory
 from ..core.checks import check_columns, check_rows, require
 from ..core.errors import DataError
 from . import funnels

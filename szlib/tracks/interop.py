@@ -64,7 +64,7 @@ def check_tracks(tracks: pd.DataFrame) -> None:
     >>> check_tracks(to_clock(raw).iloc[::-1])
     Traceback (most recent call last):
     ...
-    szlib.core.errors.DataError: row 4: got {...}; this row is out of order; expected rows sorted by day, id, t
+    szlib.core.errors.DataError: row 4: got {...}; this row is out of order; ...
     """
     order = clock_index(tracks)[0]
     expected = "this row is out of order; expected rows sorted by day, id, t"

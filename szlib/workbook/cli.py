@@ -32,7 +32,8 @@ from typing import Any
 
 import psutil
 
-from .. import __version__, memory
+from .. import __version__
+from ..core import memory
 from ..core.errors import DataError, DataWarning, SzlibError
 from ..core.input_files import printable
 
@@ -176,7 +177,8 @@ def _run(options: argparse.Namespace) -> int:
       A run with other parameters than the defaults has a folder of its own, results/DATA-HASH/.
       Notebooks that you execute by hand write to results/lab/ and never change the results of a run.
       szlib writes only to folders that are new, empty or marked by a file `.szlib`, and never to a folder
-      that holds the input data. Files are written atomically and cached by data and parameters.
+      that holds the input data. Each run executes its notebooks again; the encounters and the zone of the
+      same data and parameters are kept.
 
     checks:
       A failed check fails the run. With other parameters, checks that assume the defaults are reported as
@@ -201,41 +203,32 @@ def _run(options: argparse.Namespace) -> int:
     if reading := _read_options(options):
         parameters["reading"] = reading
     _require_workbook_packages()
-    from ..core.parallel import cluster
-    from .machine_summaries import append_markdown, require_junit, write_junit
-    from .runner import format_summary, list_results, run
+    from .runner import run
+    from .summary import append_markdown, format_summary, require_junit, write_junit
 
     junit = require_junit(Path(options.junit)) if options.junit else None
-    with cluster(options.scheduler, wait=options.wait) as client:
-        summary = run(
-            options.data[0] if len(options.data) == 1 else options.data,
-            out=options.out,
-            jobs=options.jobs,
-            only=options.only,
-            parameters=parameters,
-            client=client,
-            notebooks=options.notebooks,
-            force=options.force,
-            figures=options.figures,
-        )
+    summary = run(
+        options.data[0] if len(options.data) == 1 else options.data,
+        out=options.out,
+        jobs=options.jobs,
+        only=options.only,
+        parameters=parameters,
+        notebooks=options.notebooks,
+        figures=options.figures,
+    )
     print(format_summary(summary))
-    append_markdown(*list_results(summary))
+    append_markdown(summary)
     if junit:
         write_junit(summary, junit)
     if "report" in summary:
         print(f"report: {printable(os.path.relpath(summary['report']))}")
     if summary.get("verdict"):
         print(summary["verdict"])
-    refused = {
-        name: n["error"]
-        for name, n in summary["notebooks"].items()
-        if n["status"] == "refused"
-    }
+    outcomes = summary["notebooks"].items()
+    refused = {name: o["error"] for name, o in outcomes if o["status"] == "refused"}
     if refused:
-        error = next(iter(refused.values()))
-        raise SzlibError(
-            f"{', '.join(refused)}: could not be run: {error}; finished results stay"
-        )
+        names, error = ", ".join(refused), next(iter(refused.values()))
+        raise SzlibError(f"{names}: could not be run: {error}; finished results stay")
     return 0 if summary["passed"] else 1
 
 

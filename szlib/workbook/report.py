@@ -1,9 +1,9 @@
 """The report of a run: a front page and every executed notebook in one HTML file that needs no network.
 
 nbconvert, with which Jupyter itself exports, makes the page. The template and the renderer of this module
-leave out scripts of other servers, draw formulas as MathML, fold the code, and describe every picture.
+leave out scripts of other servers, draw formulas as MathML, and fold the code.
 
-A folder may come from anybody. So everything in it is reduced to harmless HTML, and the content security
+A folder may come from anybody. So its HTML goes through nbconvert's `SanitizeHTML`, and the content security
 policy of the page lets no script run but the player of this package.
 """
 
@@ -17,17 +17,17 @@ from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
+from html import unescape
 from pathlib import Path
 from typing import Any
 
-import bleach  # type: ignore[import-untyped]
 import nbformat
 import pandas as pd
-from bs4 import BeautifulSoup
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
+from nbconvert.preprocessors.sanitize import SanitizeHTML
 
 from ..core.errors import DataError, SzlibError
 from ..core.files import MARKER, folder_purpose, write_file
@@ -46,16 +46,22 @@ REPORT = folders.REPORT
 _LARGEST_NOTEBOOK = 100_000_000  # of an executed notebook, with its animations [bytes]
 _STATIC = Path(__file__).parent / "static"
 _HARMLESS = tomllib.loads((_STATIC / "harmless.toml").read_text(encoding="utf-8"))
-_OUTPUTS, _TAGS, _ATTRIBUTES = (
-    {*_HARMLESS[name].split()} for name in ("outputs", "tags", "attributes")
-)
+# The kinds of outputs that are shown.
+_OUTPUTS = [
+    "text/html",
+    "text/markdown",
+    "text/plain",
+    "text/latex",
+    "image/png",
+    "image/jpeg",
+]
 _SCRIPT_OR_STYLE = re.compile(r"<(script|style)\b.*?</\1>", re.DOTALL)
 # The data of a player, and its name, in the script of `static/player.html`.
 _RUN = re.compile(
     r"(?m)^const run = (\{.*\});\nconst figures = .*\[data-run=(szlib-[0-9a-f]{8})\]"
 )
-# The picture of a player, which is shown on the front page only.
-_GIF = re.compile(r'<img src="data:image/gif;base64,[^"]*" alt="([^"]*)">')
+# A picture of the notebooks' own folder.
+_PICTURE = re.compile(r'src="(figures/\w+\.(png|gif))"')
 # The text of a link to another file, and the name of the file without folder and ending.
 _FILE_LINK = re.compile(
     r"(?<!!)\[([^]\n]+)\]\((?!https?:|#|mailto:|data:)(?:[^)\s]*/)?([^)\s/.]*)(?:\([^)\s]*\)|[^)\s/])*\)"
@@ -69,35 +75,30 @@ def write_report(home: Path) -> Path:
     Raises DataError if the folder is not marked as results, holds no notebooks, or holds a damaged file.
     """
     if not (folder_purpose(home) or "").startswith(folders.RESULTS_OF):
+        marker = printable(home / MARKER)
         raise DataError(
-            f"{printable(home / MARKER)}: does not mark results of szlib; `szlib run` makes them"
+            f"{marker}: does not mark results of szlib; `szlib run` makes them"
         )
     names = [file.stem for file in sorted(home.glob("[0-9][0-9]*_*.ipynb"))]
-    if isinstance(
-        run := read_json_object(home / "summary.json").get("notebooks"), dict
-    ):
-        names = [name for name in names if name in run]
+    run = read_json_object(home / "summary.json").get("notebooks")
+    names = [name for name in names if not isinstance(run, dict) or name in run]
     if not names:
-        raise DataError(
-            f"{printable(home)}: holds no executed notebooks; `szlib run` makes them"
-        )
+        what = "holds no executed notebooks; `szlib run` makes them"
+        raise DataError(f"{printable(home)}: {what}")
     notebooks, runs = {}, dict[str, Any]()
     for name in names:
         with _reading(home / f"{name}.ipynb"):
             notebooks[name] = _read_notebook(home / f"{name}.ipynb", names, runs)
-    front, back = map(
-        nbformat.v4.new_markdown_cell, _render_front_page(home, notebooks)
-    )
     page = nbformat.v4.new_notebook()
-    page.cells = [
-        front,
-        *(cell for notebook in notebooks.values() for cell in notebook.cells),
-        back,
-    ]
+    pages = _render_front_page(home, notebooks)
+    front, back = map(nbformat.v4.new_markdown_cell, pages)
+    cells = [cell for notebook in notebooks.values() for cell in notebook.cells]
+    page.cells = [front, *cells, back]
     for i, cell in enumerate(page.cells):
         cell["id"] = f"cell-{i}"
     data = json.dumps(runs, separators=(",", ":")).replace("<", "\\u003c")
-    script = f"(() => {{\n{read_scripts('scene', 'player', 'report')}\nplayAll({data});\n}})()"
+    scripts = read_scripts("scene", "player", "report")
+    script = f"(() => {{\n{scripts}\nplayAll({data});\n}})()"
     checksum = b64encode(sha256(script.encode()).digest()).decode()
     page.metadata |= {"script": script, "script_checksum": f"sha256-{checksum}"}
     exporter = HTMLExporter(
@@ -105,8 +106,6 @@ def write_report(home: Path) -> Path:
         extra_template_basedirs=[],  # not the current folder, which is the default
         template_file="report.html.j2",
     )
-    exporter.register_filter("without_gif", lambda html: _GIF.sub(r"\1", html))
-    exporter.register_filter("harmless", _remove_harmful)
     write_file(home / REPORT, exporter.from_notebook_node(page)[0])
     return home / REPORT
 
@@ -128,56 +127,59 @@ def _reading(file: Path) -> Iterator[None]:
 def _read_notebook(
     file: Path, names: Sequence[str], runs: dict[str, Any]
 ) -> nbformat.NotebookNode:
-    """The notebook in a `file`, its texts as HTML.
+    """The notebook in a `file`, its texts as harmless HTML.
 
     Links to the notebooks `names` lead into the report. The runs that its players show are added to `runs`.
     """
     notebook = nbformat.reads(read_small(file, _LARGEST_NOTEBOOK), as_version=4)
     nbformat.validate(notebook)
-    notebook.metadata |= {"question": _find_question(notebook), "html": []}
+    question = _find_question(notebook)
+    notebook.metadata |= {"question": question, "html": []}
     for cell in notebook.cells:
         cell.metadata.clear()
         if cell.cell_type == "markdown":
             cell.source = _render_markdown(cell.source, names)
+        elif cell.cell_type == "raw":
+            cell.source = sanitize(cell.source)
         for output in cell.get("outputs", ()):
             if "data" not in output:
                 continue
-            data = {
-                kind: text for kind, text in output.data.items() if kind in _OUTPUTS
-            }
-            data = data or {"text/plain": ""}
+            data = {kind: output.data[kind] for kind in _OUTPUTS if kind in output.data}
             if "text/markdown" in data:
                 data["text/markdown"] = _render_markdown(data["text/markdown"], names)
-            if "text/html" in data:
-                runs |= {
-                    found[2]: json.loads(found[1])
-                    for found in _RUN.finditer(data["text/html"])
-                }
-                data["text/html"] = _SCRIPT_OR_STYLE.sub("", data["text/html"])
+            if html := data.get("text/html"):
+                runs |= {name: json.loads(run) for run, name in _RUN.findall(html)}
+                data["text/html"] = sanitize(_SCRIPT_OR_STYLE.sub("", html))
                 notebook.metadata["html"].append(data["text/html"])
-            alt = output.metadata.get("image/png", {}).get("alt", "")
-            output.data, output.metadata = (
-                data,
-                nbformat.from_dict({"image/png": {"alt": str(alt)}}),
-            )
+            alt = str(output.metadata.get("image/png", {}).get("alt", ""))
+            output.data = data or {"text/plain": ""}
+            output.metadata = nbformat.from_dict({"image/png": {"alt": alt}})
     return notebook
 
 
-def _remove_harmful(html: str) -> str:
-    """The same HTML with harmless tags and attributes only: nothing in it can run, or ask another server."""
-    protocols = [*bleach.ALLOWED_PROTOCOLS, "data"]
-    return str(
-        bleach.clean(
-            html, tags=_TAGS, attributes=_is_harmless, protocols=protocols, strip=True
-        )
-    )
+def sanitize(html: str) -> str:
+    """The same HTML with harmless tags and attributes only; pictures of the notebooks are embedded.
+
+    Nothing in it can run, or ask another server.
+    """
+    tags = _HARMLESS["tags"].split()
+    cleaner = SanitizeHTML(tags=tags, attributes=_is_harmless, strip=True)
+    return _PICTURE.sub(_embed, str(cleaner.sanitize_html_tags(html)))
 
 
 def _is_harmless(tag: str, name: str, value: str) -> bool:
     """Whether the attribute `name` of a `tag` may have this `value`."""
     if name == "src":
-        return tag == "img" and value.startswith("data:image/")
-    return name in _ATTRIBUTES or (name == "href" and not value.startswith("data:"))
+        return tag == "img" and bool(_PICTURE.fullmatch(f'src="{value}"'))
+    return name in _HARMLESS["attributes"].split() or name == "href"
+
+
+def _embed(found: re.Match[str]) -> str:
+    """The attribute of a picture of the notebooks with its content; none without the file."""
+    file = folders.NOTEBOOKS / found[1]
+    if not file.is_file():
+        return ""
+    return f'src="data:image/{found[2]};base64,{b64encode(file.read_bytes()).decode()}"'
 
 
 class MathRenderer(IPythonRenderer):
@@ -197,14 +199,12 @@ class MathRenderer(IPythonRenderer):
 
 
 def _render_markdown(source: str, names: Sequence[str]) -> str:
-    """Render markdown with its pictures embedded; links to the notebooks `names` lead into the report."""
-    renderer = MathRenderer(
-        escape=False, path=str(folders.NOTEBOOKS), embed_images=True
-    )
-    source = _FILE_LINK.sub(
+    """Render markdown as harmless HTML; links to the notebooks `names` lead into the report."""
+    linked = _FILE_LINK.sub(
         lambda x: f"[{x[1]}](#{x[2]})" if x[2] in names else x[1], source
     )
-    return MarkdownWithMath(renderer=renderer).render(source)
+    renderer = MathRenderer(escape=False)
+    return sanitize(MarkdownWithMath(renderer=renderer).render(linked))
 
 
 def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str]:
@@ -217,75 +217,86 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str
         for name, notebook in notebooks.items()
         for html in notebook.metadata["html"]
     ]
-    samples, zone, funnel = home / "encounters.parquet", home / "zone.json", ""
-    with _reading(home / "parameters.json"):
-        run = _read_json(home / "parameters.json")
-        is_synthetic = run.get("data") == datasets.SYNTHETIC
-        files = [f"{name} ({size:,} bytes)" for name, size, *_ in run.get("files", ())]
-        given = dict(run.get("parameters", {}).items())
-        speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
+    facts = _read_run(home)
     with _reading(home / "summary.json"):
         summary = _read_json(home / "summary.json")
-        outcomes = {
-            name: _format_outcome(name, o)
-            for name, o in summary.get("notebooks", {}).items()
-        }
+        stored = summary.get("notebooks", {}).items()
+        outcomes = {name: _format_outcome(name, outcome) for name, outcome in stored}
     for name, notebook in notebooks.items():
-        fold = {
-            "name": name,
-            "question": notebook.metadata["question"],
-            "outcome": outcomes.get(name),
-        }
-        notebook.cells[0].metadata["fold"], notebook.cells[-1].metadata["is_last"] = (
-            fold,
-            True,
-        )
-    with _reading(samples):
-        if samples.exists():
-            with open_regular(samples) as stream:
-                stages = funnels.table(funnels.get(pd.read_parquet(stream, columns=[])))
-            # each is named once
-            stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")
-            funnel = stages.to_html(
-                index=False, border=0, formatters={"rows": "{:,}".format}
-            )
+        question, outcome = notebook.metadata["question"], outcomes.get(name)
+        fold = {"name": name, "question": question, "outcome": outcome}
+        notebook.cells[0].metadata["fold"] = fold
+        notebook.cells[-1].metadata["is_last"] = True
+    zone, speed, texts = home / "zone.json", facts["speed"], dict[str, Any]()
     with _reading(zone):
-        texts = (
-            _show_zone(zone, speed, is_synthetic=is_synthetic) if zone.exists() else {}
-        )
+        if zone.exists():
+            texts = _show_zone(zone, speed, is_synthetic=facts["is_synthetic"])
     checks = [check for outcome in outcomes.values() for check in outcome["checks"]]
-    named = {check["key"]: check for check in checks}
-    claims = load_sentences().query("kind == 'claim'")
-    claims["verdict"] = [judge("claim", names, named) for names in claims["held_by"]]
-    claims["checks"] = [
-        [named[n] for n in names if n in named] for names in claims["held_by"]
-    ]
+    verdict = str(summary.get("verdict", ""))
+    described = {name: str(summary.get(name, "")) for name in _DESCRIBED}
     html = pages.get_template("front_page.html.j2").render(
+        **facts,
+        **described,
         data=str(summary.get("data", home.name)),
         data_sets=datasets.NAMES,
-        is_synthetic=is_synthetic,
-        speed=speed,
-        verdict=str(summary.get("verdict", "")).removeprefix(
-            f"zone at {speed:g} m/s: "
-        ),
+        verdict=verdict.removeprefix(f"zone at {speed:g} m/s: "),
         outcomes=outcomes,
         checks=checks,
         not_run=NOT_RUN,
-        claims=claims.to_dict("records"),
-        files=files,
-        changed=[f"{name} = {value}" for name, value in given.items()],
-        version=run.get("szlib", ""),
-        area=str(summary.get("area", "")),
+        claims=_list_claims(checks),
         notebooks=list(notebooks),
-        funnel=funnel,
+        funnel=_show_funnel(home / "encounters.parquet"),
         zone=texts,
         players={
             s.name.replace("_", " "): _find_player(s.title, outputs)
             for s in SCENARIOS.values()
         },
-        parameters=_list_parameters(outputs),
+        rows=_list_parameters(outputs),
     )
     return html.rpartition("<!-- notebooks -->")[::2]
+
+
+# What the summary of a run says of it in one line each.
+_DESCRIBED = ("area", "date", "command", "machine", "versions")
+
+
+def _read_run(home: Path) -> dict[str, Any]:
+    """The data and the parameters of the run in `home`, as its file of parameters has them."""
+    with _reading(home / folders.PARAMETERS):
+        run = _read_json(home / folders.PARAMETERS)
+        given = dict(run.get("parameters", {}).items())
+        speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
+        files = [f"{name} ({size:,} bytes)" for name, size, *_ in run.get("files", ())]
+    return {
+        "is_synthetic": run.get("data") == datasets.SYNTHETIC,
+        "files": files,
+        "changed": [f"{name} = {value}" for name, value in given.items()],
+        "version": run.get("szlib", ""),
+        "speed": speed,
+    }
+
+
+def _show_funnel(samples: Path) -> str:
+    """The stages of the encounters in the file `samples` as a table; "" without a file."""
+    with _reading(samples):
+        if not samples.exists():
+            return ""
+        with open_regular(samples) as stream:
+            stages = funnels.table(funnels.get(pd.read_parquet(stream, columns=[])))
+        # each is named once
+        stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")
+        rows = {"rows": "{:,}".format}
+        return sanitize(stages.to_html(index=False, border=0, formatters=rows))
+
+
+def _list_claims(checks: Sequence[Mapping[str, Any]]) -> Any:
+    """The claims of the paper, each with its verdict and the `checks` of this run that it rests on."""
+    named = {check["key"]: check for check in checks}
+    claims: Any = load_sentences().query("kind == 'claim'")
+    held_by = claims["held_by"]
+    claims["verdict"] = [judge("claim", names, named) for names in held_by]
+    claims["checks"] = [[named[n] for n in names if n in named] for names in held_by]
+    return claims.to_dict("records")
 
 
 def _format_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
@@ -329,7 +340,7 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
     )
     texts: dict[str, Any] = {
         "method": zone.method,
-        "table": shown.round(2).to_html(index=False, border=0),
+        "table": sanitize(shown.round(2).to_html(index=False, border=0)),
     }
     if speed in zone.ellipses:
         figure, content = Figure(figsize=(4.8, 4.5), layout="constrained"), io.BytesIO()
@@ -351,16 +362,17 @@ def _find_player(title: str, outputs: Sequence[tuple[str, str]]) -> str:
     )
 
 
-def _list_parameters(outputs: Sequence[tuple[str, str]]) -> dict[tuple[str, ...], str]:
+def _list_parameters(
+    outputs: Sequence[tuple[str, str]],
+) -> dict[tuple[str, ...], str]:
     """Each row of the tables of `szlib.workbook.record.parameters`, and the first notebook that shows it."""
-    rows: dict[tuple[str, ...], str] = {}
+    found: dict[tuple[str, ...], str] = {}
     for name, html in outputs:
-        if ">badge<" in html:
-            for row in BeautifulSoup(html, "html.parser").select("tbody tr"):
-                rows.setdefault(
-                    tuple(cell.get_text(strip=True) for cell in row.select("td")), name
-                )
-    return rows
+        table = html.partition(">badge<")[2]
+        for row in re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL):
+            cells = re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)
+            found.setdefault(tuple(unescape(cell.strip()) for cell in cells), name)
+    return {cells: name for cells, name in found.items() if len(cells) == 4}
 
 
 def _read_json(file: Path) -> dict[str, Any]:

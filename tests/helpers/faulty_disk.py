@@ -6,7 +6,7 @@ import errno
 import os
 from pathlib import Path
 
-from szlib import files
+from szlib.core import files
 
 
 class FaultyDisk:

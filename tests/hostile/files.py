@@ -1,7 +1,7 @@
 """A disk that is full at each write in turn, damaged files, and clocks that jump: no result is wrong.
 
-Every file is written by `szlib.core.files`, where the fault is put in: half of the bytes are written, then there
-is no room.  Afterwards finished files are intact, and the same call makes the same bytes (except for the
+Every file is written by `szlib.core.files`, where the fault is put in: half of the bytes are written, then
+there is no room.  Afterwards finished files are intact, and the same call makes the same bytes (except for the
 times of steps).
 """
 
@@ -26,7 +26,7 @@ import pandas as pd
 from helpers.faulty_disk import FaultyDisk
 
 import szlib
-from szlib import files
+from szlib.core import files
 from szlib.core.errors import DataError, StorageError, ZoneError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings

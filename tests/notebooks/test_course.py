@@ -24,6 +24,7 @@ def _course():
 
 course = _course()
 STORY = course.pages()
+WEEKS = course.weeks(STORY)
 REFERENCE = course.REFERENCE.read_text(encoding="utf-8")
 FOLDERS = tuple(
     folders.NOTEBOOKS / part for part in ("", "deeper", "exercises", "solutions")
@@ -83,30 +84,30 @@ def test_every_link_has_a_target(folder):
 
 
 def test_the_course_reads_every_notebook_and_does_every_task_once():
-    numbers = Counter(number for _, numbers, _ in course.WEEKS for number in numbers)
+    numbers = Counter(number for _, numbers, _ in WEEKS for number in numbers)
     assert set(numbers.values()) == {1}
     assert set(numbers) == {page.number for page in STORY if page.is_chapter} - {"00"}
     done = Counter(
         task
-        for _, _, ranges in course.WEEKS
+        for _, _, ranges in WEEKS
         for part in ranges
         for task in course.expand(part)
     )
     assert done == dict.fromkeys(course.tasks(), 1)
-    assert len(course.WEEKS) == 6
-    assert {page.number for page in STORY} <= set(course.GIVES)
+    assert len(WEEKS) == 6
 
 
 def test_every_task_belongs_to_one_notebook_and_comes_after_it():
     owners = {
         n: [t for part in parts for t in course.expand(part)]
-        for n, parts in course.EXERCISES.items()
+        for n, parts in ((p.number, p.front.get("exercises", ())) for p in STORY)
+        if parts
     }
     belongs = Counter(task for tasks in owners.values() for task in tasks)
     assert belongs == dict.fromkeys(course.tasks(), 1)
     assert set(owners) <= {page.number for page in STORY}
     unread = {page.number for page in STORY if page.is_chapter}
-    for _, numbers, ranges in course.WEEKS:
+    for _, numbers, ranges in WEEKS:
         unread -= set(numbers)
         early = {
             n
@@ -132,15 +133,16 @@ def test_weeks_take_about_the_same_time():
         + sum(
             course.tasks()[task][2] for part in ranges for task in course.expand(part)
         )
-        for _, numbers, ranges in course.WEEKS
+        for _, numbers, ranges in WEEKS
     ]
     assert max(times) <= 1.6 * min(times), times
 
 
 def test_what_a_notebook_needs_is_an_earlier_chapter():
     order = [page.number for page in STORY]
-    for number, needed in course.NEEDS.items():
-        assert order.index(needed) < order.index(number)
+    for page in STORY:
+        for needed in page.front.get("needs", ()):
+            assert order.index(needed) < order.index(page.number)
 
 
 # --- reading times -----------------------------------------------------------------------------------
@@ -227,9 +229,8 @@ def test_figures_are_counted_in_the_executed_copy(tmp_path):
 def test_word_is_explained_at_its_first_use(word):
     first = course.first_uses(STORY)[word]
     (page,) = [page for page in STORY if page.number == first]
-    assert f"*{word}*: {course.GLOSSARY[word].means}" in " ".join(
-        page.cells[1].source.split()
-    )
+    means = course.GLOSSARY[word]["means"]
+    assert f"*{word}*: {means}" in " ".join(page.cells[1].source.split())
     before = STORY[1 : STORY.index(page)]
     assert not any(
         re.search(rf"\b{word}\b", text) for each in before for text in each.prose

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import szlib
-from szlib import memory
+from szlib.core import memory
 from szlib.core.errors import MemoryLimitError, StorageError
 from szlib.tracks import datasets
 from szlib.tracks.formats import unpack

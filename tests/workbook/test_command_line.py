@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib import ATC_SQUARE, parallel
+from szlib import ATC_SQUARE
+from szlib.core import parallel
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.workbook.cli import main

@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pandas as pd
+import plots
 import pytest
 from PIL import Image
 from studies.safety_claims import MOTION_CHANGES
@@ -157,9 +158,9 @@ MAPS = {
     "space": lambda f: figures.plot_attentional_space(
         szlib.AttentionalSpace(), szlib.ATC_SQUARE, pose=(-13, 0, 1.0)
     ),
-    "paths": lambda f: figures.plot_encounter_paths(paths(), n_shown=3),
-    "los": lambda f: figures.plot_relative_positions(f("samples")),
-    "outliers": lambda f: figures.plot_outliers(
+    "paths": lambda f: plots.plot_encounter_paths(paths(), n_shown=3),
+    "los": lambda f: plots.plot_relative_positions(f("samples")),
+    "outliers": lambda f: plots.plot_outliers(
         np.eye(2).repeat(3, axis=0), np.arange(6) < 1
     ),
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
@@ -183,7 +184,7 @@ def ways_step():
 
 
 def test_the_way_that_is_taken_is_solid_and_the_others_are_dashed(ways_step):
-    ax = figures.plot_ways(ways_step)
+    ax = plots.plot_ways(ways_step)
     assert len(ways_step.ways) > 1 and in_metres(ax)
     names = [text.get_text() for text in ax.get_legend().get_texts()]
     lines = [line for line in ax.lines if line.get_label() in names]
@@ -202,15 +203,15 @@ def test_the_way_that_is_taken_is_solid_and_the_others_are_dashed(ways_step):
 
 def test_without_ways_the_scene_is_drawn(step):
     assert step.ways == ()
-    ax = figures.plot_ways(step)
+    ax = plots.plot_ways(step)
     assert ax.get_legend() is None and ax.get_title() == "No way was looked for"
     assert in_metres(ax)
 
 
 GRAPHS = {
-    "speeds": lambda f: figures.plot_speed_histogram(np.ones(9), np.zeros(9)),
-    "los-distance": lambda f: figures.plot_distance_by_direction(f("samples")),
-    "hull": lambda f: figures.plot_hull(f("zone"), (0.9, 1.1)),
+    "speeds": lambda f: plots.plot_speed_histogram(np.ones(9), np.zeros(9)),
+    "los-distance": lambda f: plots.plot_distance_by_direction(f("samples")),
+    "hull": lambda f: plots.plot_hull(f("zone"), (0.9, 1.1)),
 }
 
 
@@ -223,13 +224,13 @@ def test_maps_are_square_and_in_metres(name, request):
 
 
 def test_the_cells_count_every_sample_within_r_max(samples):
-    for plot in (figures.plot_relative_positions, figures.plot_distance_by_direction):
+    for plot in (plots.plot_relative_positions, plots.plot_distance_by_direction):
         (cells,) = [c for c in plot(samples).collections if c.get_array() is not None]
         assert cells.get_array().sum() == (samples["distance"] <= 2).sum()
 
 
 def test_an_arrow_points_along_the_end_of_each_path():
-    ax = figures.plot_encounter_paths(paths(), n_shown=3)
+    ax = plots.plot_encounter_paths(paths(), n_shown=3)
     marks = [
         line
         for line in ax.lines
@@ -255,7 +256,7 @@ def test_given_axes_are_drawn_on(zone):
 
 
 def test_n_shown_limits_the_number_of_paths():
-    ax = figures.plot_encounter_paths(paths(), n_shown=3)
+    ax = plots.plot_encounter_paths(paths(), n_shown=3)
     assert all(len(c.get_segments()) == 3 for c in ax.collections)
 
 
@@ -312,12 +313,12 @@ def test_a_quantile_zone_shows_its_radii_and_has_no_hull(samples):
     ]
     assert labels == ["radius by direction (quantile)", "fitted ellipse"]
     with pytest.raises(szlib.ZoneError, match="'quantile' has no hull to draw"):
-        figures.plot_hull(zone)
+        plots.plot_hull(zone)
 
 
-def test_speed_and_barriers_show_the_whole_range(log):
-    speed, h = figures.plot_speed(log), figures.plot_barriers(log)
-    assert "[m/s]" in speed.get_ylabel() and "[m]" in h.get_ylabel()
+def test_barriers_show_the_whole_range(log):
+    h = figures.plot_barriers(log)
+    assert "[m]" in h.get_ylabel()
     assert len(h.lines) == 3, "the person, the nearest of two walls, zero"
     assert np.array_equal(h.lines[1].get_ydata(), log.h[:, 1:].min(axis=1))
     assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()
@@ -336,24 +337,29 @@ def test_the_limits_hold_everything_that_is_drawn(log):
     assert (everything.max(axis=0) <= limits[:, 1] + 1e-9).all()
 
 
-PLOTS = [name for name in dir(figures) if name.startswith("plot_")]
+PLOTS = [
+    (module, name)
+    for module in (figures, plots)
+    for name in dir(module)
+    if name.startswith("plot_")
+]
 
 
-@pytest.mark.parametrize("name", PLOTS)
-def test_every_plot_takes_axes_or_makes_them_and_needs_no_title(name):
-    parameters = inspect.signature(getattr(figures, name)).parameters
+@pytest.mark.parametrize(("module", "name"), PLOTS)
+def test_every_plot_takes_axes_or_makes_them_and_needs_no_title(module, name):
+    parameters = inspect.signature(getattr(module, name)).parameters
     assert parameters["ax"].default is None
     assert "title" not in parameters
 
 
-def test_every_plot_is_exported():
-    folder = Path(figures.__file__).parent
+@pytest.mark.parametrize("module", [figures, plots])
+def test_every_plot_is_exported(module):
     defined = {
-        d
-        for f in folder.glob("*.py")
-        for d in re.findall(r"^def (plot_\w+)", f.read_text(), re.M)
+        (module, name)
+        for file in Path(module.__file__).parent.glob("*.py")
+        for name in re.findall(r"^def (plot_\w+)", file.read_text(), re.MULTILINE)
     }
-    assert defined == set(PLOTS)
+    assert defined == {each for each in PLOTS if each[0] is module}
 
 
 def test_a_log_has_plot_and_animate(log):
@@ -384,7 +390,7 @@ def test_alt_text_holds_titles_axes_and_legends():
 def test_the_pair_correlation_is_in_metres_and_names_its_radius():
     direction, distance = np.linspace(0.1, 6.1, 36), np.linspace(0.05, 1.95, 40)
     g = np.tile(1 / (1 + np.exp(-(distance - 0.8) / 0.1)), (36, 1))
-    ax = figures.plot_pair_correlation(
+    ax = plots.plot_pair_correlation(
         szlib.PairCorrelation(distance, direction, g), radius=0.8
     )
     assert in_metres(ax)
@@ -395,7 +401,7 @@ def test_the_pair_correlation_is_in_metres_and_names_its_radius():
 
 def test_each_zone_size_has_a_band():
     sizes = {"a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
-    ax = figures.plot_zone_sizes(
+    ax = plots.plot_zone_sizes(
         pd.DataFrame({"encounters": [10, 100], **sizes}), {"a": "hull"}
     )
     assert ax.get_xscale() == "log" and "[m]" in ax.get_ylabel()
@@ -409,7 +415,7 @@ def test_the_largest_sensitivity_is_on_top():
         ("speed", "0.9", 0.5),
         ("speed", "1.3", 4.0),
     ]
-    ax = figures.plot_sensitivity(
+    ax = plots.plot_sensitivity(
         pd.DataFrame(rows, columns=["parameter", "value", "area"])
     )
     assert [label.get_text() for label in ax.get_yticklabels()] == [
@@ -426,7 +432,7 @@ def test_a_map_of_strategies_has_the_fill_of_its_strategy_in_each_cell():
             "strategy": list("xyyz"),
         }
     )
-    ax = figures.plot_strategies(
+    ax = plots.plot_strategies(
         cells, names=["x", "y", "z"], rows="gamma", columns="width"
     )
     handles, names = ax.get_legend_handles_labels()
@@ -451,7 +457,7 @@ def test_claims_differ_by_more_than_colour_and_keep_their_units():
          "high": [2.0, -0.5, 1, np.nan], "unit": ["m", "m2", "s", "m"],
          "verdict": ["supported", "contradicted", *["not decidable with n = 3"] * 2]}
     )  # fmt: skip
-    panels = figures.draw_claims(table).axes
+    panels = plots.draw_claims(table).axes
     assert len({ax.lines[0].get_marker() for ax in panels}) == 3
     assert [ax.get_title(loc="left") for ax in panels] == list("abcd")
     assert [ax.get_title(loc="right") for ax in panels[1:3]] == [
@@ -471,7 +477,7 @@ def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():
         "yard": (1.0, 0.7, 1.4),
     }
     pooled = szlib.pool(sites)
-    ax = figures.plot_forest(pooled)
+    ax = plots.plot_forest(pooled)
     labels = [label.get_text() for label in ax.get_yticklabels()]
     assert [label.partition(":")[0] for label in labels] == [
         *sites,
@@ -486,7 +492,7 @@ def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():
     diamond = ax.patches[0].get_xy()[:, 0]
     assert (diamond.min(), diamond.max()) == (pooled.low, pooled.high)
     assert ax.lines[-1].get_xdata().tolist() == [pooled.new_low, pooled.new_high]
-    few = figures.plot_forest(
+    few = plots.plot_forest(
         szlib.pool(
             {name: sites[name] for name in ("hall", "mall")}, quantity="center_x"
         )
@@ -505,7 +511,7 @@ def test_an_interval_grid_has_a_panel_for_each_metric_and_one_legend():
         rows, columns=["crowd", "who", "metric", "mean", "low", "high"]
     )
     labels = {"s": "share", "t": "time [s]", "u": "u", "v": "v"}
-    grid = figures.draw_interval_grid(
+    grid = plots.draw_interval_grid(
         table, labels, rows="crowd", colour="who", title="A and b"
     )
     assert [ax.get_xlabel() for ax in grid.axes if ax.axison] == list(labels.values())
@@ -531,7 +537,7 @@ def test_safety_violations_are_shares_of_the_steps_claimed_safe():
     )
     widths = [
         bar.get_width()
-        for bars in figures.plot_safety_claims(table).containers
+        for bars in plots.plot_safety_claims(table).containers
         for bar in bars
     ]
     assert sorted(widths)[-2:] == [2, 3]
@@ -546,7 +552,7 @@ def test_recorded_encounter_is_animated_in_real_time(tmp_path: Path) -> None:
     number = int(samples["encounter"].iloc[-1])
     seconds = np.ptp(samples.loc[samples["encounter"] == number, "t"])
     options = {"margin": 0.5, "every": 0.5, "width": 5.0}
-    gif = figures.animate_encounter(tracks, samples, number, **options)
+    gif = plots.animate_encounter(tracks, samples, number, **options)
     movie = Image.open(io.BytesIO(gif))
     assert movie.n_frames == round((seconds + 1.0) / 0.5) + 1
     frames = []
@@ -557,12 +563,12 @@ def test_recorded_encounter_is_animated_in_real_time(tmp_path: Path) -> None:
     assert all((np.abs(now - before) > 60).any() for before, now in pairwise(frames)), (
         "people move"
     )
-    assert gif != figures.animate_encounter(
+    assert gif != plots.animate_encounter(
         tracks, samples, number, zone=szlib.Ellipse((0, 0), (1, 1)), **options
     )
     with pytest.raises(
         szlib.DataError, match=r"encounter -1 is not among the \d+ encounters"
     ):
-        figures.animate_encounter(tracks, samples, -1)
+        plots.animate_encounter(tracks, samples, -1)
     with pytest.raises(szlib.DataError, match="its people are not in these tracks"):
-        figures.animate_encounter(tracks.head(0), samples, number)
+        plots.animate_encounter(tracks.head(0), samples, number)

@@ -1,10 +1,8 @@
 """A run decides about its kernels, figures and module path, whatever environment and folder hold."""
 
-import errno
 import json
 import os
 import re
-import socket
 import subprocess
 import sys
 import tempfile
@@ -14,7 +12,7 @@ import nbformat
 import pytest
 
 import szlib
-from szlib import files
+from szlib.core import files
 from szlib.workbook import cli, report, runner
 from szlib.workbook.cli import main
 
@@ -79,70 +77,15 @@ def test_kernel_imports_nothing_from_its_folder_and_leaves_no_temporary_file(
     summary = runner.run("mine.csv", out=tmp_path / "out")
     assert summary["passed"], summary
     found = {name: each["key_figures"] for name, each in summary["notebooks"].items()}
-    assert not {"", ".", str(folder), str(tmp_path)} & {*found["01_look"]["path"]}
-    assert found["06_import"]["path"][-1] == str(folder), (
-        "the notebook imports a package beside it"
-    )
+    assert not {"", ".", str(tmp_path)} & {*found["01_look"]["path"]}
+    for each in found.values():
+        assert each["path"][-1] == str(folder), "the packages beside the notebooks"
     assert found["01_look"]["python"] == sys.executable
-    assert found["01_look"]["ipython"] == str(
-        Path(found["01_look"]["temporary"]).parent
-    )
+    private = str(Path(found["01_look"]["temporary"]).parent)
+    assert found["01_look"]["ipython"] == private
     assert not Path(found["01_look"]["temporary"]).exists()
     assert os.environ["MPLBACKEND"] == "Agg" and "PYTHONSAFEPATH" not in os.environ
     assert not list((tmp_path / "temporary").glob("*.json"))
-
-
-@pytest.mark.parametrize(
-    ("limits", "raised"), [((64, -1), (112, -1)), ((256, 4096), None)]
-)
-def test_too_low_a_limit_of_open_files_is_raised_where_the_system_allows_it(
-    notebooks, tmp_path, monkeypatch, limits, raised
-):
-    resource = pytest.importorskip("resource")
-    given = []
-    monkeypatch.setattr(
-        resource,
-        "getrlimit",
-        lambda what: limits if what == resource.RLIMIT_NOFILE else (-1, -1),
-    )
-    monkeypatch.setattr(resource, "setrlimit", lambda _, pair: given.append(pair))
-    done = {
-        "status": "done",
-        "seconds": 0.0,
-        "checks": [],
-        "key_figures": {},
-        "figures": [],
-    }
-    monkeypatch.setattr(
-        runner,
-        "_execute_all",
-        lambda scripts, *_: [(script, done) for script in scripts],
-    )
-    notebooks(_01_one="")
-    runner.run("mine.csv", out=tmp_path / "out")
-    assert given == ([raised] if raised else [])
-
-
-def test_limit_of_open_files_is_named(notebooks, monkeypatch, capsys):
-    resource = pytest.importorskip("resource")
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (64, 64))
-    notebooks(_01_one="")
-    assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
-    assert (
-        "may open 64 files on this machine, and a run needs 112; raise the limit"
-        in capsys.readouterr().err
-    )
-
-
-def test_limit_of_memory_is_named(notebooks, monkeypatch, capsys):
-    resource = pytest.importorskip("resource")
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (1_500_000_000, -1))
-    notebooks(_01_one="")
-    assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
-    assert (
-        "may use 1.5 GB of memory on this machine (ulimit -v), and a run needs 2.0 GB"
-        in (capsys.readouterr().err)
-    )
 
 
 @pytest.mark.parametrize(
@@ -159,22 +102,6 @@ def test_memory_that_is_used_up_is_named(error, monkeypatch, capsys):
     monkeypatch.setattr(cli, "_inspect", fail)
     assert main(["inspect", "day.csv"]) == 2
     assert "szlib: this process has no more memory" in capsys.readouterr().err
-
-
-def test_run_is_refused_at_once_where_kernels_cannot_be_reached(
-    notebooks, tmp_path, monkeypatch, capsys
-):
-    def fail(*_, **__):
-        raise OSError(errno.ENETUNREACH, "Network is unreachable")
-
-    monkeypatch.setattr(socket, "create_connection", fail)
-    notebooks(_01_one="")
-    assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
-    assert (
-        "127.0.0.1 cannot be reached (Network is unreachable)"
-        in capsys.readouterr().err
-    )
-    assert not (tmp_path / "out").exists()
 
 
 def test_umask_that_forbids_everything_is_named(

@@ -190,7 +190,7 @@ def test_interrupted_run_leaves_no_summary_that_passed(
     arguments = ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]
     assert main(arguments) == 0
     monkeypatch.setattr(runner, "execute_notebook", interrupt)
-    assert main([*arguments, "--force"]) == 130
+    assert main(arguments) == 130
     assert not (tmp_path / "out" / "mine" / "summary.json").exists()
     assert not list((tmp_path / "out" / "mine" / "records").iterdir())
 
@@ -376,9 +376,7 @@ def test_run_recovers_from_a_full_disk_at_any_write(
         "key_figures": {},
         "figures": [],
     }
-    monkeypatch.setattr(
-        runner, "execute_notebook", lambda script, *_: (Path(script).stem, done)
-    )
+    monkeypatch.setattr(runner, "execute_notebook", lambda *_: done)
     command = ["run", "--data", "mine.csv", "--out", "out"]
     for failing in itertools.count():
         shutil.rmtree(tmp_path / "out", ignore_errors=True)

@@ -12,7 +12,7 @@ from szlib.core.errors import DataError
 from szlib.core.files import write_checksum
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook import cli, notebook_execution, runner
+from szlib.workbook import cli, execution, runner
 from szlib.workbook.cli import main
 from szlib.workbook.record.data_cache import _load
 from szlib.workbook.record.parameters import check_parameters
@@ -265,16 +265,14 @@ def test_notebooks_that_run_at_the_same_time_share_the_cores(
     given = []
     monkeypatch.setattr(os, "cpu_count", lambda: 6)
     monkeypatch.setattr(
-        runner,
-        "execute_notebook",
-        lambda *task: given.append(task[-1]) or ("01_a", DONE),
+        runner, "execute_notebook", lambda *task: given.append(task[-1]) or DONE
     )
     notebooks(**{f"_0{n}_a": "" for n in range(1, 5)})
     monkeypatch.delenv("OMP_NUM_THREADS")
-    runner.run("mine.csv", out="out", jobs=jobs, force=True)
+    runner.run("mine.csv", out="out", jobs=jobs)
     assert {environment["OMP_NUM_THREADS"] for environment in given} == {threads}
     monkeypatch.setenv("OMP_NUM_THREADS", "5")
-    runner.run("mine.csv", out="out", jobs=jobs, force=True)
+    runner.run("mine.csv", out="out", jobs=jobs)
     assert given[-1]["OMP_NUM_THREADS"] == "5", "the user's own value stays"
 
 
@@ -367,16 +365,15 @@ def test_a_signal_that_ends_a_kernel_and_the_run_leaves_no_unfinished_copy(
     script, folder = tmp_path / "01_one.py", tmp_path / "out"
     script.write_text(KILLS_ITS_KERNEL)
     folder.mkdir()
-    monkeypatch.setattr(notebook_execution, "_SIGNAL_DELAY", 20.0 if stopped else 0.01)
+    monkeypatch.setattr(execution, "_SIGNAL_DELAY", 20.0 if stopped else 0.01)
     with ThreadPoolExecutor(1) as executor:
         given = {"file": str(tmp_path / "begun")}
-        execution = executor.submit(
-            notebook_execution.execute_notebook, str(script), given, str(folder), {}
-        )
+        ended = executor.submit(execution.execute_notebook, script, given, folder, {})
         while stopped and not (tmp_path / "begun").exists():
             time.sleep(0.05)
         if stopped:
             time.sleep(0.5)  # the signal ends the kernel first
-            notebook_execution.end_kernels([execution])
-        assert execution.result()[1]["status"] == "refused"
+            execution.STOPPED.set()
+        assert ended.result()["status"] == "refused"
+    execution.STOPPED.clear()
     assert (folder / "01_one.ipynb").exists() != stopped

@@ -21,7 +21,7 @@ import pyarrow.dataset  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import shapely
 
-from ... import memory
+from ...core import memory
 from ...core.errors import DataError
 from ..options import ReadOptions
 from .base import TrackFormat, decode_first_line, decode_line, is_number, scan_table

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ... import memory
+from ...core import memory
 from ...core.errors import DataError, StorageError
 from ...core.files import temporary_folder
 from ...core.input_files import printable, readable_path, unchanged_files

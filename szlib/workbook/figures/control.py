@@ -23,19 +23,13 @@ from ...control.obstacles import (
 from ...control.step import Step
 from ...core.checks import Array
 from ...zones.ellipses import Ellipse
-from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
+from .palette import BLACK, BLUE, GREEN, GREY, RED
 from .style import add_legend_below, draw_person, get_axes, label_metres
 
 # Points on each side of the grid on which the outline of an obstacle is found.
 _GRID = 201
 _CHORD_ERROR = 1e-3  # distance of a corner of this outline that may be left out [m]
-# Colours and lines of ways, the one that is taken first; a print in grey keeps them apart.
-_WAYS: tuple[tuple[str, Any], ...] = (
-    (BLUE, "-"),
-    (ORANGE, (0, (5, 2))),
-    (BLACK, (0, (1.5, 1.5))),
-)
-_ARROW: dict[str, Any] = {
+ARROW: dict[str, Any] = {
     "angles": "xy",
     "scale_units": "xy",
     "scale": 1,
@@ -70,7 +64,7 @@ def plot_distance(
     ax = get_axes(ax, size=(5.5, 4.5))
     grid = _grid(extent, 241)
     name = "the zone" if isinstance(shape, Ellipse) else "the wall"
-    distance = _distance(grid, shape)
+    distance = paper_distance(grid, shape)
     levels = [
         d
         for d in np.arange(-0.5, 1.6, 0.25).tolist()
@@ -84,13 +78,13 @@ def plot_distance(
         linewidths=0.8,
     )
     ray = np.linspace(0, extent, 500)[:, None] * (0.6, -0.8)
-    along = _distance(ray, shape)
+    along = paper_distance(ray, shape)
     crossed = [d for d in levels if max(0, along.min()) < d < along.max()]
     at = [tuple(ray[np.abs(along - d).argmin()].tolist()) for d in crossed]
     ax.clabel(lines, fmt="%.2f", fontsize=7, manual=at)
     h = barrier(distance, margin, 0.0)
     ax.contour(*np.moveaxis(grid, -1, 0), h, levels=[0.0], colors=[RED], linewidths=2)
-    ax.plot(*_outline(shape).T, color=BLACK, linewidth=2, label=f"{name}, d = 0")
+    ax.plot(*outline_shape(shape).T, color=BLACK, linewidth=2, label=f"{name}, d = 0")
     ax.plot([], [], color=RED, linewidth=2, label=f"h = 0, d = {margin:g} m")
     add_legend_below(ax)
     return label_metres(ax, f"Distance to {name} [m], and h = 0")
@@ -101,13 +95,13 @@ def _grid(extent: float, n: int) -> Array:
     return np.stack(np.meshgrid(ticks, ticks), axis=-1)
 
 
-def _distance(points: Array, shape: Ellipse | ArrayLike) -> Array:
+def paper_distance(points: Array, shape: Ellipse | ArrayLike) -> Array:
     if isinstance(shape, Ellipse):
         return ellipse_distance(points, shape)
     return segment_distance(points, *check_wall(shape))
 
 
-def _outline(shape: Ellipse | ArrayLike) -> Array:
+def outline_shape(shape: Ellipse | ArrayLike) -> Array:
     return shape.curve() if isinstance(shape, Ellipse) else check_wall(shape)
 
 
@@ -134,7 +128,7 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
         )
     )
     curves = [np.add((x, y), [(-1.5, -1.5), (1.5, 1.5)])]
-    ax.quiver(x, y, vx, vy, color=BLUE, **_ARROW)
+    ax.quiver(x, y, vx, vy, color=BLUE, **ARROW)
     ax.plot(
         *step.predicted[:, :2].T,
         ".-",
@@ -148,7 +142,7 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
         curves.append(zone.placed((px, py), heading).curve())
         ax.plot(*curves[-1].T, color=RED, linewidth=1.8, label="zone")
         draw_person(ax, px, py, heading, color=RED, markersize=7)
-        ax.quiver(px, py, *person.velocity, color=RED, **_ARROW)
+        ax.quiver(px, py, *person.velocity, color=RED, **ARROW)
     drawn = np.vstack(curves)
     (x0, y0), half = (
         (drawn.min(axis=0) + drawn.max(axis=0)) / 2,
@@ -223,56 +217,3 @@ def _measure_gap(
     x0, x1, y0, y1 = limits
     x, y = np.meshgrid(np.linspace(x0, x1, _GRID), np.linspace(y0, y1, _GRID))
     return x, y, obstacle.gap(x, y, 0.0, *obstacle.numbers)
-
-
-def plot_ways(step: Step, ax: Axes | None = None) -> Axes:
-    """Plot the ways of a step: the one that is taken solid, the others dashed, each with its name and cost.
-
-    The robot is at the first dot of a way after 1 s, at the next one after 2 s. An arrow leads to where its
-    person is after 1 s.
-
-    Parameters
-    ----------
-    step : result of a controller's `step`; without ways (`Step.ways`) only the scene is drawn.
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> settings = szlib.MPCSettings.among_people()
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), settings=settings)
-    >>> step = controller.step((0, 0, 0, 0), (8, 0), [szlib.Person((3.0, 0.0), heading=0.0)])
-    >>> len(figures.plot_ways(step).get_legend().get_texts()) == len(step.ways)
-    True
-    """
-    ax, scene = get_axes(ax, size=(6, 5.2)), step.scene
-    at, goal, handles = (scene.state[0], scene.state[1]), scene.goal, list[Any]()
-    for i, way in enumerate(step.ways):
-        colour, line = _WAYS[i % len(_WAYS)]
-        label = f"{'not ' if i else ''}taken: {way.name}, cost {way.cost:.1f} s"
-        style: Any = {"color": colour, "linestyle": line, "zorder": 3 - i / 10}
-        handles += ax.plot(*way.points.T, linewidth=2 if i else 3, label=label, **style)
-        seconds = way.at(np.arange(1.0, way.times[-1]))
-        ax.plot(*seconds.T, "o", color=colour, markersize=4, zorder=3)
-    curves = [np.array([at, goal]), *(way.points for way in step.ways)]
-    pairs = zip(scene.people, scene.person_zones, strict=True)
-    for i, (person, zone) in enumerate(pairs):
-        (x, y), heading = person.position, person.heading or 0.0
-        curves.append(zone.placed((x, y), heading).curve())
-        ax.plot(*curves[-1].T, color=RED, linewidth=1)
-        draw_person(ax, x, y, heading, color=RED, markersize=7)
-        ax.quiver(x, y, *person.velocity, color=RED, **_ARROW)
-        ax.annotate(f"{i}", (x, y), (5, 5), textcoords="offset points", fontsize=9)
-    (x0, y0), (x1, y1) = (each(np.vstack(curves), axis=0) for each in (np.min, np.max))
-    ax.set(xlim=(x0 - 0.8, x1 + 0.8), ylim=(y0 - 0.8, y1 + 0.8))
-    for obstacle in scene.fixed.items:
-        draw_obstacle(ax, obstacle)
-    ax.add_patch(Circle(at, scene.settings.r_robot, color=BLUE, alpha=0.45, lw=0))
-    ax.plot(*goal, "D", color=BLUE, markersize=8, markeredgecolor=BLACK, zorder=4)
-    if handles:
-        place: Any = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
-        ax.legend(handles=handles, **place, fontsize=8)
-    n = len(step.ways)
-    title = f"{n} way{'s' * (n > 1)}" if n else "No way was looked for"
-    return label_metres(ax, title)

@@ -87,41 +87,6 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
     return label_metres(ax, f"{run.scenario.title} (times in s; later is darker)")
 
 
-def plot_speed(run: Run, *, ax: Axes | None = None) -> Axes:
-    """Plot the robot's speed over time, its limit, and when it makes no progress for 5 s.
-
-    Parameters
-    ----------
-    run : the run.
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
-    >>> ax = figures.plot_speed(log)
-    """
-    ax = get_axes(ax, size=(8, 2.5))
-    ax.plot(run.time, run.speed, color=BLUE, label="robot")
-    ax.axhline(run.settings.v_max, color=GREY, linestyle="--", label="limit")
-    top = 1.15 * max(run.settings.v_max, float(run.speed.max()))
-    if run.stuck.any():
-        ax.fill_between(
-            run.time,
-            0,
-            top,
-            run.stuck > 0,
-            color=ORANGE,
-            alpha=0.25,
-            label="no progress",
-        )
-    ax.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, top))
-    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
-    return ax
-
-
 def plot_barriers(run: Run, *, ax: Axes | None = None) -> Axes:
     """Plot h of each person and the least h of obstacles over time, on a log scale above 0.5 m.
 

@@ -6,7 +6,8 @@ function play(figure, run) {
   figure.textContent = "";
   const width = Math.max(200, Math.min(figure.clientWidth || 640, 640));
   const [x0, x1, y0, y1] = layout.limits;
-  const height = Math.round(Math.min(420, (width * (y1 - y0)) / (x1 - x0)));
+  const axis = 26;  // room for the numbers, which walls would cross inside the scene [pixels]
+  const height = Math.round(Math.min(420, ((width - 2 * axis) * (y1 - y0)) / (x1 - x0)) + axis);
   const sceneCanvas = addElement(figure, "canvas", { role: "img", ariaLabel: run.alt });
   const chartCanvas = addElement(figure, "canvas", { role: "img", ariaLabel: "the least h over time" }, { display: "block", marginTop: "6px" });
   const scene = prepareCanvas(sceneCanvas, width, height), chart = prepareCanvas(chartCanvas, width, 100);
@@ -17,7 +18,7 @@ function play(figure, run) {
   for (const factor of [1, 2, 4]) addElement(pace, "option", { value: factor, textContent: `${factor}\u00d7`, selected: factor === 2 });
   const status = addElement(figure, "div", {}, { fontSize: "12px", fontVariantNumeric: "tabular-nums" });
   addLegend(figure, layout.colours);
-  const view = makeView(layout.limits, width, height);
+  const view = makeView(layout.limits, width, height, axis);
   const times = snapshots.map((s) => s.t), values = snapshots.map((s) => s.h);
   let started = null;
 

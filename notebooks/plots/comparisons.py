@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from ...zones.pooling import POSITIVE, UNITS, Pooled
-from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from .style import add_legend_below, add_shared_legend, get_axes
+from szlib.workbook.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
+from szlib.workbook.figures.style import add_legend_below, add_shared_legend, get_axes
+from szlib.zones.pooling import POSITIVE, UNITS, Pooled
 
 # Colour and hatching of each kind of safety violation.
 _BARS = {
@@ -24,6 +24,8 @@ _BARS = {
     "sped up": (ORANGE, "xxx"),
     "faced elsewhere": (BLUE, "|||"),
 }
+
+
 # Fill of each strategy in a map: colour and hatching, so that they differ in grey as well.
 _FILLS = (
     ("#F0F0F0", ""),
@@ -33,6 +35,8 @@ _FILLS = (
     (ORANGE, "//"),
     (RED, "xxx"),
 )
+
+
 _VERDICTS = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
 
 
@@ -48,15 +52,13 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.workbook import figures
+    >>> import plots
     >>> index, columns = pd.Index([0.05, 0.1], name="gamma"), pd.Index([1, 2], name="speed [m/s]")
-    >>> ax = figures.plot_sweep(pd.DataFrame([[0, 0.1], [0.2, 0.4]], index, columns), worst=0.4)
+    >>> ax = plots.plot_sweep(pd.DataFrame([[0, 0.1], [0.2, 0.4]], index, columns), worst=0.4)
     """
     values = table.to_numpy(float)
     ax = get_axes(ax, size=(5, 3.5))
-    ax.imshow(
-        np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto"
-    )
+    ax.imshow(np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         ax.text(
             column,
@@ -90,9 +92,9 @@ def plot_strategies(
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.workbook import figures
+    >>> import plots
     >>> table = pd.DataFrame({"gamma": [0.1, 0.2], "width": [1.0, 1.0], "strategy": ["passes", "waits"]})
-    >>> ax = figures.plot_strategies(table, names=["passes", "waits"], rows="gamma", columns="width")
+    >>> ax = plots.plot_strategies(table, names=["passes", "waits"], rows="gamma", columns="width")
     """
     found = table.pivot(index=rows, columns=columns, values="strategy").sort_index()
     ax = get_axes(ax, size=(5, 3.5))
@@ -135,10 +137,10 @@ def draw_interval_grid(
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.workbook import figures
+    >>> import plots
     >>> row = {"crowd": "ETH", "robot": "MPC-CBF", "metric": "time", "mean": 9.0, "low": 8.0, "high": 10.0}
     >>> table = pd.DataFrame([row])
-    >>> figure = figures.draw_interval_grid(table, {"time": "time [s]"}, rows="crowd", colour="robot")
+    >>> figure = plots.draw_interval_grid(table, {"time": "time [s]"}, rows="crowd", colour="robot")
     """
     n_rows = -(-len(labels) // columns)
     size = (4.4 * columns, n_rows * (0.36 * table[rows].nunique() + 1.3) + 0.6)
@@ -174,9 +176,7 @@ def _plot_intervals(ax: Axes, table: pd.DataFrame, *, rows: str, colour: str) ->
     ax.grid(axis="x", color=GREY, alpha=0.3)
 
 
-def plot_zone_sizes(
-    table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None
-) -> Axes:
+def plot_zone_sizes(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None) -> Axes:
     """Plot sizes of zones by the number of encounters, with their intervals.
 
     Parameters
@@ -189,9 +189,9 @@ def plot_zone_sizes(
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.workbook import figures
+    >>> import plots
     >>> sizes = {"encounters": [10, 100], "a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
-    >>> ax = figures.plot_zone_sizes(pd.DataFrame(sizes), {"a": "hull"})
+    >>> ax = plots.plot_zone_sizes(pd.DataFrame(sizes), {"a": "hull"})
     """
     ax = get_axes(ax, size=(6, 4))
     styles = zip(("-o", "--s", ":^", "-.D"), (RED, BLUE, GREY, GREEN), strict=True)
@@ -206,9 +206,7 @@ def plot_zone_sizes(
             linewidth=0,
         )
         ax.plot(n, table[name], style, color=colour, markersize=4, label=label)
-    ax.set(
-        xscale="log", xlabel="encounters", ylabel="size of the zone [m]", ylim=(0, None)
-    )
+    ax.set(xscale="log", xlabel="encounters", ylabel="size of the zone [m]", ylim=(0, None))
     ax.legend(fontsize=8)
     return ax
 
@@ -225,9 +223,9 @@ def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.workbook import figures
+    >>> import plots
     >>> table = {"parameter": ["default", "r_max", "r_max"], "value": ["", 1.5, 2.5], "area": [2.0, 1.8, 2.1]}
-    >>> ax = figures.plot_sensitivity(pd.DataFrame(table))
+    >>> ax = plots.plot_sensitivity(pd.DataFrame(table))
     """
     ax = get_axes(ax, size=(8, 4.5))
     default = float(table["area"].iloc[0])
@@ -246,14 +244,10 @@ def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     names = []
     for row, name in enumerate(width.index):
         values = varied[varied["parameter"] == name].sort_values("area")
-        ax.plot(
-            values["area"], np.full(len(values), row), "o", color=BLUE, markersize=5
-        )
+        ax.plot(values["area"], np.full(len(values), row), "o", color=BLUE, markersize=5)
         # beside the axis: no overlap
         names.append(f"{name}\n{'; '.join(map(str, values['value']))}")
-    ax.axvline(
-        default, color=BLACK, linewidth=1.2, label=f"defaults: {default:.2f} m$^2$"
-    )
+    ax.axvline(default, color=BLACK, linewidth=1.2, label=f"defaults: {default:.2f} m$^2$")
     ax.set_yticks(range(len(width)), names)
     ax.set(
         xlabel="area of the zone [m$^2$]; values from left to right",
@@ -277,13 +271,11 @@ def draw_claims(table: pd.DataFrame, *, title: str = "") -> Figure:
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.workbook import figures
+    >>> import plots
     >>> claim = {"claim": "zones grow with speed", "effect": 0.1, "low": 0.05, "high": 0.2, "unit": "m2"}
-    >>> figure = figures.draw_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
+    >>> figure = plots.draw_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
     """
-    figure, grid = plt.subplots(
-        n := len(table), figsize=(8, 1.1 * n), layout="constrained", squeeze=False
-    )
+    figure, grid = plt.subplots(n := len(table), figsize=(8, 1.1 * n), layout="constrained", squeeze=False)
     for ax, row in zip(grid.flat, table.to_dict("records"), strict=True):
         colour, marker = _VERDICTS[row["verdict"].split()[0]]
         ax.hlines(0, row["low"], row["high"], color=colour, linewidth=3)
@@ -296,9 +288,7 @@ def draw_claims(table: pd.DataFrame, *, title: str = "") -> Figure:
             xlim=(-reach, reach) if np.isfinite(reach) else (-1, 1),
         )
         ax.set_title(row["claim"], loc="left", fontsize=10)
-        ax.set_title(
-            row["verdict"].partition(" with")[0], loc="right", fontsize=10, color=colour
-        )
+        ax.set_title(row["verdict"].partition(" with")[0], loc="right", fontsize=10, color=colour)
     figure.suptitle(title)
     return figure
 
@@ -315,14 +305,11 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> ax = figures.plot_forest(szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}))
+    >>> import plots
+    >>> ax = plots.plot_forest(szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}))
     """
     n, sites = pooled.n_sites, pooled.table.set_index("site")[["value", "low", "high"]]
-    labels = [
-        f"{name}: {mid:.2f} ({low:.2f} to {high:.2f})"
-        for name, mid, low, high in sites.itertuples()
-    ]
+    labels = [f"{name}: {mid:.2f} ({low:.2f} to {high:.2f})" for name, mid, low, high in sites.itertuples()]
     labels.append(f"mean: {pooled.mean:.2f}")
     ax = get_axes(ax, size=(7.5, 0.35 * n + 1.9))
     if pooled.quantity in POSITIVE:
@@ -357,9 +344,7 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
         )
         labels.append(f"a new site: {pooled.new_low:.2f} to {pooled.new_high:.2f}")
     ax.set_yticks(range(len(labels)), labels)
-    text = (
-        f"{pooled.quantity} of the zone [{UNITS[pooled.quantity]}], with 95 % intervals"
-    )
+    text = f"{pooled.quantity} of the zone [{UNITS[pooled.quantity]}], with 95 % intervals"
     ax.set(xlabel=text, ylim=(len(labels) - 0.4, -0.6))
     return ax
 
@@ -376,18 +361,14 @@ def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.workbook import figures
+    >>> import plots
     >>> table = pd.DataFrame(1, index=["ETH"], columns=["came", "turned", "claimed_safe_steps"])
-    >>> ax = figures.plot_safety_claims(table)
+    >>> ax = plots.plot_safety_claims(table)
     """
     ax = get_axes(ax, size=(8, 3.5))
     left = np.zeros(len(table))
     for kind in table.columns.drop("claimed_safe_steps"):
-        share = (
-            1000
-            * table[kind].to_numpy(float)
-            / table["claimed_safe_steps"].to_numpy(float)
-        )
+        share = 1000 * table[kind].to_numpy(float) / table["claimed_safe_steps"].to_numpy(float)
         if kind in _BARS or share.any():
             colour, hatch = _BARS.get(kind, ("magenta", "ooo"))
             ax.barh(

@@ -1,0 +1,138 @@
+"""One notebook: papermill sets its parameters, and nbclient, papermill's engine, executes it."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Mapping
+from contextlib import closing
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from ..core.errors import SzlibError
+from ..core.files import write_file
+from ..core.input_files import printable, read_json_object
+from .record.data_cache import describe_missing_data
+from .record.parameters import METHOD_DEFAULTS, read_defaults
+
+# Errors caused by data, disk or memory, not by the notebook.
+REFUSED = {
+    "DataError", "StorageError", "MemoryLimitError", "ZoneError", "SolverError", "SzlibError", "MemoryError",
+    "OSError", "PermissionError", "FileNotFoundError", "IsADirectoryError", "NotADirectoryError",
+    "DeadKernelError",
+}  # fmt: skip
+# The record of a notebook that wrote none.
+EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
+# Set when the run is stopped: a notebook whose kernel was ended then writes no copy.
+STOPPED = Event()
+# A signal that ends a kernel and the run reaches the run within this time [s].
+_SIGNAL_DELAY = 1.0
+
+
+def execute_notebook(
+    script: Path,
+    parameters: Mapping[str, Any],
+    folder: Path,
+    environment: Mapping[str, str],
+) -> dict[str, Any]:
+    """Execute one notebook in a kernel of its own, and save the executed copy.
+
+    Parameters
+    ----------
+    script : the notebook's percent script.
+    parameters : values that replace the defaults of the cell tagged "parameters".
+    folder : the results of the run.
+    environment : further environment variables of the kernel.
+
+    Returns
+    -------
+    The outcome of the notebook: status, seconds, an error if there is one, and its record.
+    """
+    start = time.perf_counter()
+    outcome: dict[str, Any] = {"status": "done"}
+    try:
+        run_cells(script, parameters, folder, environment)
+    except Exception as error:  # of szlib, of a cell, or of Jupyter
+        outcome = _describe(error, folder)
+    outcome["seconds"] = round(time.perf_counter() - start, 2)
+    record = read_json_object(folder / "records" / f"{script.stem}.json")
+    if not record.get("closed") and outcome["status"] == "done":
+        missing = "the notebook wrote no record; it must end with record.close()"
+        outcome |= {"status": "error", "error": missing}
+    return outcome | {
+        name: record.get(name, EMPTY_RECORD[name]) for name in EMPTY_RECORD
+    }
+
+
+def _describe(error: Exception, folder: Path) -> dict[str, Any]:
+    """Status and text of the `error` that ended a notebook, whose results are in `folder`."""
+    name = getattr(error, "ename", type(error).__name__)
+    text = " ".join(f"{name}: {getattr(error, 'evalue', error)}".split())
+    outcome = {"status": "error", "error": printable(text)}
+    if name in REFUSED or isinstance(error, SzlibError | OSError | MemoryError):
+        outcome["status"] = "refused"
+    samples = folder / "encounters.parquet"
+    if name == "ZoneError" and describe_missing_data(samples):
+        outcome["status"] = "undecided"
+        outcome["error"] = f"not decidable on this data: {outcome['error']}"
+    return outcome
+
+
+def run_cells(
+    script: Path,
+    parameters: Mapping[str, Any],
+    folder: Path,
+    environment: Mapping[str, str],
+) -> None:
+    """Run the cells of a notebook, and write the executed copy also if a cell fails.
+
+    `script`, `parameters`, `folder` and `environment` are those of `execute_notebook`.
+    Raises the error of nbclient for a cell that fails, or for a kernel that ends.
+    """
+    import jupytext
+    import nbformat
+    import papermill
+    from jupyter_core.utils import ensure_event_loop
+    from nbclient import NotebookClient
+    from nbclient.exceptions import DeadKernelError
+
+    from .kernel import INLINE, OwnKernelManager
+
+    # The parameters of the zone are in no notebook's own cell.
+    logging.getLogger("papermill").setLevel(logging.ERROR)
+    known = METHOD_DEFAULTS.keys() | read_defaults(script).keys()
+    notebook = papermill.execute_notebook(
+        jupytext.read(script),
+        None,
+        {name: value for name, value in parameters.items() if name in known},
+        kernel_name="python3",
+        language="python",
+        prepare_only=True,
+    )
+    notebook.metadata.pop("papermill")  # times and paths of this machine
+    # The packages beside the notebooks come last: no file there replaces a library.
+    place = script.parents[1] if script.parent.name == "deeper" else script.parent
+    add = f"import sys; sys.path.append({str(place)!r})"
+    client = NotebookClient(
+        notebook,
+        kernel_manager_class=OwnKernelManager,
+        resources={"metadata": {"path": str(script.parent)}},
+        extra_arguments=[
+            "--log-level=CRITICAL",
+            f"--InteractiveShellApp.exec_lines={add}",
+        ],
+    )
+    own = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1"}
+    is_stopped = False
+    try:
+        # the loop of this thread, which Jupyter leaves open
+        with closing(ensure_event_loop()):
+            client.execute(env={**os.environ, **own, **environment})
+    except DeadKernelError:
+        is_stopped = STOPPED.wait(_SIGNAL_DELAY)
+        raise
+    finally:
+        if not is_stopped:
+            write_file(folder / f"{script.stem}.ipynb", nbformat.writes(notebook))
