@@ -1,8 +1,8 @@
 """A disk that is full at each write in turn, damaged files, and clocks that jump: no result is wrong.
 
 Every file is written by `szlib.core.files`, where the fault is put in: half of the bytes are written, then
-there is no room.  Afterwards finished files are intact, and the same call makes the same bytes (except for the
-times of steps).
+there is no room.  Afterwards finished files are intact, and the same call makes the same bytes (except for
+the times of steps).
 """
 
 from __future__ import annotations
