@@ -41,6 +41,7 @@ ID_STEP = 100
 
 # of staged encounters, each with x and y
 _VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")
+_COLUMNS = [name + axis for name in _VECTORS for axis in "xy"]
 _PAUSE = 1.0  # between a pair's end and the start of the next [s]
 # from the start of the window until the two are closest [s]
 _TIME_TO_CLOSEST = (0.5, 2.5)
@@ -145,12 +146,8 @@ def stage_encounters(
         plan,
     )
     vectors = [walker, walker + offset, speed[:, None] * ahead, other_v, swerve]
-    columns = {
-        name + axis: v[:, k]
-        for name, v in zip(_VECTORS, vectors, strict=True)
-        for k, axis in enumerate("xy")
-    }
     closest = start + settings.lead_time + before
+    columns = dict(zip(_COLUMNS, np.hstack(vectors).T, strict=True))
     return pd.DataFrame({"kind": kind, "start": start, "closest": closest, **columns})
 
 
@@ -176,9 +173,8 @@ def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
     """
     since = (np.asarray(t, float) - staged["closest"].to_numpy())[:, None]
     swerved, deviation = _swerve(since)
-    walker, other, walker_v, other_v, swerve = (
-        staged[[name + "x", name + "y"]].to_numpy() for name in _VECTORS
-    )
+    vectors = np.split(staged[_COLUMNS].to_numpy(), len(_VECTORS), axis=1)
+    walker, other, walker_v, other_v, swerve = vectors
     position = [walker + walker_v * since, other + other_v * since + swerve * deviation]
     return np.stack(position, axis=1), np.stack(
         [walker_v, other_v + swerve * swerved], axis=1
@@ -259,7 +255,7 @@ def _draw(
     offset = np.where(
         intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal
     )
-    (low, high) = settings.intruder_speeds
+    low, high = settings.intruder_speeds
     limit = 2 * settings.max_speed
     pace = rng.uniform(
         np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit)
@@ -342,9 +338,9 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     ms = rng.integers(*_FRAMES, int(lasts * 1000 / _FRAMES[0]) + 1, endpoint=True)
     frames = start[0] + np.cumsum(ms) / 1000
     pair = np.searchsorted(start, frames, side="right") - 1
-    pair, frames = (
-        array[frames <= start[pair] + settings.tracked] for array in (pair, frames)
-    )
+    is_tracked = frames <= start[pair] + settings.tracked
+    pair = pair[is_tracked]
+    frames = frames[is_tracked]
     position, velocity = positions(staged.iloc[pair], frames)
     measured = position + rng.normal(0, settings.noise, position.shape)
     sensor_velocity = velocity + rng.normal(0, _VELOCITY_NOISE, velocity.shape)
@@ -357,33 +353,18 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     short = settings.short_gaps
     long = settings.long_gaps
     kind = rng.choice(3, (n, 2), p=[short, long, 1 - short - long])
-    length = np.stack(
-        [
-            rng.uniform(*_SHORT_GAP, (n, 2)),
-            rng.uniform(*_LONG_GAP, (n, 2)),
-            np.zeros((n, 2)),
-        ]
-    )
-    length = np.take_along_axis(length, kind[None], axis=0)[0]
+    lengths = [rng.uniform(*gap, (n, 2)) for gap in (_SHORT_GAP, _LONG_GAP)]
+    length = np.choose(kind, [*lengths, np.zeros((n, 2))])
     gap_start = start[:, None] + rng.uniform(0, settings.tracked - length)
-    is_recorded = ~(
-        (frames[:, None] > gap_start[pair])
-        & (frames[:, None] < (gap_start + length)[pair])
-    )
+    time = frames[:, None]
+    is_recorded = ~((time > gap_start[pair]) & (time < (gap_start + length)[pair]))
     speed = np.linalg.norm(sensor_velocity, axis=-1)
-    metres = {
-        "x": measured[..., 0],
-        "y": measured[..., 1],
-        "z": height,
-        "velocity": speed,
-    }
+    metres = np.stack([*np.moveaxis(measured, -1, 0), height, speed])
+    millimetres = np.rint(1000 * metres).astype(np.int32)
     columns = {
-        "time": np.broadcast_to(frames[:, None], is_recorded.shape),
+        "time": np.broadcast_to(time, is_recorded.shape),
         "id": FIRST_ID + ID_STEP * (2 * pair[:, None] + np.arange(2)),
-        **{
-            name: np.rint(1000 * value).astype(np.int32)
-            for name, value in metres.items()
-        },
+        **dict(zip(("x", "y", "z", "velocity"), millimetres, strict=True)),
         "motion_angle": np.arctan2(sensor_velocity[..., 1], sensor_velocity[..., 0]),
         "facing_angle": wrap_angle(facing),
     }
