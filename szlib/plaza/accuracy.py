@@ -1,7 +1,5 @@
 """The precision and recall of a rule for outliers."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

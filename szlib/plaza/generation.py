@@ -146,9 +146,10 @@ def stage_encounters(
         plan,
     )
     vectors = [walker, walker + offset, speed[:, None] * ahead, other_v, swerve]
-    closest = start + settings.lead_time + before
-    columns = dict(zip(_COLUMNS, np.hstack(vectors).T, strict=True))
-    return pd.DataFrame({"kind": kind, "start": start, "closest": closest, **columns})
+    columns = {"kind": kind, "start": start}
+    columns["closest"] = start + settings.lead_time + before
+    columns |= zip(_COLUMNS, np.hstack(vectors).T, strict=True)
+    return pd.DataFrame(columns)
 
 
 def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
@@ -209,8 +210,15 @@ def _draw_encounters(
         mean = settings.clearance + _SHIFT * max(0, number - _GROWS_AFTER)
         clear[redrawn] = rng.exponential(mean, len(redrawn))
         before[pending] = rng.uniform(*_TIME_TO_CLOSEST, len(pending))
-        drawn = (plan[pending], speed[pending], bearing[pending], clear[pending])
-        motion[pending] = _draw(rng, settings, *drawn, bend=number % 2 * _MAX_CURVATURE)
+        motion[pending] = _draw(
+            rng,
+            settings,
+            plan[pending],
+            speed[pending],
+            bearing[pending],
+            clear[pending],
+            bend=number % 2 * _MAX_CURVATURE,
+        )
         drawn = (plan[pending], speed[pending], before[pending], motion[pending])
         pending = pending[~_is_possible(settings, *drawn)]
         if not len(pending):
@@ -251,18 +259,17 @@ def _draw(
     edge /= np.linalg.norm(edge, axis=-1, keepdims=True)
     tangent = np.where(intruder[:, None], _rotate_left(unit), edge)
     normal = -_rotate_left(tangent)
-    intrusion = rng.uniform(*settings.intruder_distances, n)
+    intrusion = rng.uniform(*settings.intruder_distances, (n, 1))
     offset = np.where(
-        intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal
+        intruder[:, None], intrusion * unit, point + clear[:, None] * normal
     )
     low, high = settings.intruder_speeds
     limit = 2 * settings.max_speed
     pace = rng.uniform(
         np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit)
     )
-    pace = np.where(
-        plan == "together", rng.uniform(0, _DRIFT, n), np.where(standing, speed, pace)
-    )
+    slow = [rng.uniform(0, _DRIFT, n), speed]
+    pace = np.select([plan == "together", standing], slow, pace)
     side = np.where(standing, -np.sign(tangent[:, 0]), rng.choice([-1.0, 1.0], n))
     passing = (side * pace)[:, None] * tangent
     curvature = np.where(plan == "passing", rng.uniform(0, bend, n), 0.0)
@@ -300,8 +307,7 @@ def _is_possible(
     possible = is_in_view & (np.hypot(x, y) >= 1 + MARGIN) & has_walking_speed
     # checked last, because zones take longest
     some = np.flatnonzero(possible & is_respectful)
-    walker_speed = np.broadcast_to(speed[some, None], pace[some].shape)
-    possible[some] = _stays_outside(settings, position[some], walker_speed)
+    possible[some] = _stays_outside(settings, position[some], speed[some, None])
     some = np.flatnonzero(possible & is_respectful & ~is_standing)
     course = np.arctan2(velocity[some, :, 1], velocity[some, :, 0])
     possible[some] = _stays_outside(
@@ -322,7 +328,7 @@ def _swerve(since: Array) -> tuple[Array, Array]:
 def _stays_outside(
     settings: PlazaSettings, points: Array, speed: Array
 ) -> NDArray[np.bool_]:
-    """Which paths (n, moments, 2) [m] stay outside the zones at speeds (n, moments) at all moments; (n,)."""
+    """Which paths (n, moments, 2) [m] are always outside the zones at speeds (n, moments or 1); (n,)."""
     center, semi_axes, angle = settings.interpolate_zones(speed)
     # the zones become the unit disc
     mapped = _rotate(points - center, -angle) / semi_axes

@@ -137,13 +137,10 @@ class PlazaSettings:
                 f"(lowest, highest), between 0 and {2 * top} m/s and at least {_MIN_INTRUDER_SPEED} m/s",
             ),
         }
-        for names in (
-            ("standing", "together", "intruders"),
-            ("short_gaps", "long_gaps"),
-        ):
-            shares = [getattr(self, name) for name in names]
+        for names in ("standing, together, intruders", "short_gaps, long_gaps"):
+            shares = [getattr(self, name) for name in names.split(", ")]
             are_shares = min(shares) >= 0 and sum(shares) <= 1
-            require(are_shares, ", ".join(names), shares, "shares, in sum at most 1")
+            require(are_shares, names, shares, "shares, in sum at most 1")
         for name, (is_valid, expected) in checks.items():
             require(is_valid, name, getattr(self, name), expected)
         needed = np.hypot(swept_length(high), SPACE.width) + 2 * MARGIN
@@ -154,9 +151,13 @@ class PlazaSettings:
                 f"got {given:.1f} m; use a larger area or slower walkers"
             )
         self.compute_start_time()
-        zones = map(self.true_zone, np.linspace(low, high, 3))
         reach = ellipse_reach(
-            np.array([(*zone.center, *zone.semi_axes, zone.angle) for zone in zones])
+            np.array(
+                [
+                    (*zone.center, *zone.semi_axes, zone.angle)
+                    for zone in map(self.true_zone, np.linspace(low, high, 3))
+                ]
+            )
         )
         if not (reach < R_MAX).all():  # NaN where a zone does not contain the person
             raise ZoneError(
@@ -176,10 +177,10 @@ class PlazaSettings:
         share = (speed - _LOW_SPEED) / (_HIGH_SPEED - _LOW_SPEED)
         # the shorter rotation
         turn = Ellipse((0, 0), (1, 1), fast.angle - slow.angle).angle
-        begin = np.array([*slow.center, *slow.semi_axes])
-        end = np.array([*fast.center, *fast.semi_axes])
-        zones = begin + share[..., None] * (end - begin)
-        return zones[..., :2], zones[..., 2:], slow.angle + share * turn
+        part = share[..., None]
+        center = np.add(slow.center, part * np.subtract(fast.center, slow.center))
+        growth = np.subtract(fast.semi_axes, slow.semi_axes)
+        return center, slow.semi_axes + part * growth, slow.angle + share * turn
 
     def compute_start_time(self) -> float:
         """Compute the time at which the first pair comes [s since 1970]."""
