@@ -52,7 +52,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
 from sklearn.neighbors import LocalOutlierFactor
-from studies import pooled_plazas, real_day
+from studies import plaza_truth, pooled_plazas, real_day
 
 import szlib
 from szlib.plaza import accuracy
@@ -240,7 +240,7 @@ settings = szlib.PlazaSettings(intruders=intruders, intruder_speeds=SLOW_INTRUDE
 file = szlib.make_plaza(record.out / "03_intruders.csv", seed=seed, settings=settings)
 people = szlib.find_encounters(szlib.read_tracks(file), settings=record.cache.method.encounter_settings())
 people = people[people["distance"] <= r_max]
-intruder = accuracy.true_kinds(people, seed=seed, settings=settings) == "intruder"
+intruder = plaza_truth.true_kinds(people, seed=seed, settings=settings) == "intruder"
 crossed = people.loc[intruder, "encounter"].nunique()
 n_people = people["encounter"].nunique()
 print(f"{n_people:,} encounters within {r_max:g} m, {crossed} of them with an intruder")
@@ -319,9 +319,9 @@ record.figure(fig, "found")
 # Checks
 errors = {}
 for rule, method in zip(rules, ("paper", "hull"), strict=True):
-    options = {"method": method, "speeds": accuracy.SPEEDS, "n_resamples": 0}
+    options = {"method": method, "speeds": plaza_truth.SPEEDS, "n_resamples": 0}
     zone = szlib.SocialZone.fit(people, r_max=r_max, **options)
-    errors[rule] = accuracy.largest_error(zone, settings)
+    errors[rule] = plaza_truth.largest_error(zone, settings)
 by_quota, by_whole = errors.values()
 precision, recall = accuracy.precision_and_recall(whole, intruder)
 record.key |= {"encounters: precision": precision, "encounters: recall": recall}

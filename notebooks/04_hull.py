@@ -59,10 +59,10 @@ import numpy as np
 import plots
 from IPython.display import Markdown
 from scipy.spatial import ConvexHull
-from studies import real_day
+from studies import plaza_truth, real_day
 
 import szlib
-from szlib.plaza import PlazaSettings, accuracy
+from szlib.plaza import PlazaSettings
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 from szlib.zones import hulls, outliers
@@ -165,7 +165,7 @@ same = np.array_equal(np.sort(vertices, axis=0), np.sort(zone.shape.vertices, ax
 found = f"{len(zone.shape.vertices)} vertices"
 record.check("these lines and the library find the same vertices", same, found, always=True)
 if record.cache.is_synthetic:
-    off = accuracy.largest_error(zone, speeds=speeds)
+    off = plaza_truth.largest_error(zone, speeds=speeds)
     record.check("the zones of these slices are the true ones, to 5 cm", off < 0.05, f"{off:.3f} m")
 
 # %% [markdown]

@@ -69,11 +69,11 @@ from studies import plazas as plazas_study
 from studies import zones as zones_study
 from studies.distances import compare_distances
 from studies.folds import fold_table
+from studies.plaza_truth import true_kinds
 
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
 import szlib
-from szlib.plaza.accuracy import true_kinds
 from szlib.workbook import figures, paper_sentences
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 from szlib.zones.outliers import is_outlier

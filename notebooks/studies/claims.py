@@ -28,10 +28,10 @@ from matplotlib.figure import Figure
 from scipy.stats import t as student_t
 from studies import paper_claims as claims
 from studies.committed import write_table
+from studies.plaza_truth import true_kinds
 from studies.respect import stored
 
 import szlib
-from szlib.plaza.accuracy import true_kinds
 from szlib.tracks import sites
 from szlib.workbook import figures
 from szlib.zones.outliers import is_outlier

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from studies import plaza_truth
 from studies.committed import write_table
 from tqdm import tqdm
 
@@ -38,7 +39,7 @@ INTRUDERS = [
 PACES = {"rushing": RUSHING_INTRUDERS, "slow": SLOW_INTRUDERS}
 FAMILIES = (0, 100)
 POOLED = (1, 3, 5, 6, 8)
-HULL = {"method": "hull", "fraction": 0.0, "speeds": accuracy.SPEEDS, "n_resamples": 0}
+HULL = {"method": "hull", "fraction": 0.0, "speeds": plaza_truth.SPEEDS, "n_resamples": 0}
 COSTLY = {
     (share, pace, 0, plazas)
     for share, pace in (INTRUDERS[1], INTRUDERS[3], INTRUDERS[5])
@@ -52,7 +53,7 @@ def plaza_samples(seed: int, settings: szlib.PlazaSettings) -> pd.DataFrame:
     with tempfile.TemporaryDirectory() as folder:
         file = szlib.make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)
         samples = szlib.find_encounters(szlib.read_tracks(file))
-    return samples.assign(kind=accuracy.true_kinds(samples, seed=seed, settings=settings))
+    return samples.assign(kind=plaza_truth.true_kinds(samples, seed=seed, settings=settings))
 
 
 def pooled(tables: list[pd.DataFrame]) -> pd.DataFrame:
@@ -71,7 +72,7 @@ def judged(
     removed = ~close.index.isin(kept.index)
     precision, recall = accuracy.precision_and_recall(removed, close["kind"] == "intruder")
     try:
-        error = accuracy.largest_error(szlib.SocialZone.fit(kept, **HULL), settings)
+        error = plaza_truth.largest_error(szlib.SocialZone.fit(kept, **HULL), settings)
     except ZoneError:  # nothing is left of the zone
         error = np.nan
     return {"removed": removed.mean(), "precision": precision, "recall": recall, "error": error}

@@ -2,10 +2,10 @@
 
 settings    the settings of the plaza, and the true zone of its people: `PlazaSettings`
 generation  how its people walk, and what a sensor records of them: `make_plaza`
-accuracy    the precision of a rule for outliers, and the error of a zone
+accuracy    the precision and recall of a rule for outliers
 """
 
-from .accuracy import largest_error, precision_and_recall, true_kinds
+from .accuracy import precision_and_recall
 from .generation import make_plaza, positions, stage_encounters
 from .settings import (
     ANY_SPEED_INTRUDERS,

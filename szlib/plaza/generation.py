@@ -41,6 +41,7 @@ ID_STEP = 100
 
 # of staged encounters, each with x and y
 _VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")
+_COLUMNS = [name + axis for name in _VECTORS for axis in "xy"]
 _PAUSE = 1.0  # between a pair's end and the start of the next [s]
 # from the start of the window until the two are closest [s]
 _TIME_TO_CLOSEST = (0.5, 2.5)
@@ -145,13 +146,10 @@ def stage_encounters(
         plan,
     )
     vectors = [walker, walker + offset, speed[:, None] * ahead, other_v, swerve]
-    columns = {
-        name + axis: v[:, k]
-        for name, v in zip(_VECTORS, vectors, strict=True)
-        for k, axis in enumerate("xy")
-    }
-    closest = start + settings.lead_time + before
-    return pd.DataFrame({"kind": kind, "start": start, "closest": closest, **columns})
+    columns = {"kind": kind, "start": start}
+    columns["closest"] = start + settings.lead_time + before
+    columns |= zip(_COLUMNS, np.hstack(vectors).T, strict=True)
+    return pd.DataFrame(columns)
 
 
 def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
@@ -176,9 +174,8 @@ def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
     """
     since = (np.asarray(t, float) - staged["closest"].to_numpy())[:, None]
     swerved, deviation = _swerve(since)
-    walker, other, walker_v, other_v, swerve = (
-        staged[[name + "x", name + "y"]].to_numpy() for name in _VECTORS
-    )
+    vectors = np.split(staged[_COLUMNS].to_numpy(), len(_VECTORS), axis=1)
+    walker, other, walker_v, other_v, swerve = vectors
     position = [walker + walker_v * since, other + other_v * since + swerve * deviation]
     return np.stack(position, axis=1), np.stack(
         [walker_v, other_v + swerve * swerved], axis=1
@@ -213,8 +210,15 @@ def _draw_encounters(
         mean = settings.clearance + _SHIFT * max(0, number - _GROWS_AFTER)
         clear[redrawn] = rng.exponential(mean, len(redrawn))
         before[pending] = rng.uniform(*_TIME_TO_CLOSEST, len(pending))
-        drawn = (plan[pending], speed[pending], bearing[pending], clear[pending])
-        motion[pending] = _draw(rng, settings, *drawn, bend=number % 2 * _MAX_CURVATURE)
+        motion[pending] = _draw(
+            rng,
+            settings,
+            plan[pending],
+            speed[pending],
+            bearing[pending],
+            clear[pending],
+            bend=number % 2 * _MAX_CURVATURE,
+        )
         drawn = (plan[pending], speed[pending], before[pending], motion[pending])
         pending = pending[~_is_possible(settings, *drawn)]
         if not len(pending):
@@ -255,18 +259,17 @@ def _draw(
     edge /= np.linalg.norm(edge, axis=-1, keepdims=True)
     tangent = np.where(intruder[:, None], _rotate_left(unit), edge)
     normal = -_rotate_left(tangent)
-    intrusion = rng.uniform(*settings.intruder_distances, n)
+    intrusion = rng.uniform(*settings.intruder_distances, (n, 1))
     offset = np.where(
-        intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal
+        intruder[:, None], intrusion * unit, point + clear[:, None] * normal
     )
-    (low, high) = settings.intruder_speeds
+    low, high = settings.intruder_speeds
     limit = 2 * settings.max_speed
     pace = rng.uniform(
         np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit)
     )
-    pace = np.where(
-        plan == "together", rng.uniform(0, _DRIFT, n), np.where(standing, speed, pace)
-    )
+    slow = [rng.uniform(0, _DRIFT, n), speed]
+    pace = np.select([plan == "together", standing], slow, pace)
     side = np.where(standing, -np.sign(tangent[:, 0]), rng.choice([-1.0, 1.0], n))
     passing = (side * pace)[:, None] * tangent
     curvature = np.where(plan == "passing", rng.uniform(0, bend, n), 0.0)
@@ -304,8 +307,7 @@ def _is_possible(
     possible = is_in_view & (np.hypot(x, y) >= 1 + MARGIN) & has_walking_speed
     # checked last, because zones take longest
     some = np.flatnonzero(possible & is_respectful)
-    walker_speed = np.broadcast_to(speed[some, None], pace[some].shape)
-    possible[some] = _stays_outside(settings, position[some], walker_speed)
+    possible[some] = _stays_outside(settings, position[some], speed[some, None])
     some = np.flatnonzero(possible & is_respectful & ~is_standing)
     course = np.arctan2(velocity[some, :, 1], velocity[some, :, 0])
     possible[some] = _stays_outside(
@@ -326,7 +328,7 @@ def _swerve(since: Array) -> tuple[Array, Array]:
 def _stays_outside(
     settings: PlazaSettings, points: Array, speed: Array
 ) -> NDArray[np.bool_]:
-    """Which paths (n, moments, 2) [m] stay outside the zones at speeds (n, moments) at all moments; (n,)."""
+    """Which paths (n, moments, 2) [m] are always outside the zones at speeds (n, moments or 1); (n,)."""
     center, semi_axes, angle = settings.interpolate_zones(speed)
     # the zones become the unit disc
     mapped = _rotate(points - center, -angle) / semi_axes
@@ -342,9 +344,9 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     ms = rng.integers(*_FRAMES, int(lasts * 1000 / _FRAMES[0]) + 1, endpoint=True)
     frames = start[0] + np.cumsum(ms) / 1000
     pair = np.searchsorted(start, frames, side="right") - 1
-    pair, frames = (
-        array[frames <= start[pair] + settings.tracked] for array in (pair, frames)
-    )
+    is_tracked = frames <= start[pair] + settings.tracked
+    pair = pair[is_tracked]
+    frames = frames[is_tracked]
     position, velocity = positions(staged.iloc[pair], frames)
     measured = position + rng.normal(0, settings.noise, position.shape)
     sensor_velocity = velocity + rng.normal(0, _VELOCITY_NOISE, velocity.shape)
@@ -357,33 +359,18 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     short = settings.short_gaps
     long = settings.long_gaps
     kind = rng.choice(3, (n, 2), p=[short, long, 1 - short - long])
-    length = np.stack(
-        [
-            rng.uniform(*_SHORT_GAP, (n, 2)),
-            rng.uniform(*_LONG_GAP, (n, 2)),
-            np.zeros((n, 2)),
-        ]
-    )
-    length = np.take_along_axis(length, kind[None], axis=0)[0]
+    lengths = [rng.uniform(*gap, (n, 2)) for gap in (_SHORT_GAP, _LONG_GAP)]
+    length = np.choose(kind, [*lengths, np.zeros((n, 2))])
     gap_start = start[:, None] + rng.uniform(0, settings.tracked - length)
-    is_recorded = ~(
-        (frames[:, None] > gap_start[pair])
-        & (frames[:, None] < (gap_start + length)[pair])
-    )
+    time = frames[:, None]
+    is_recorded = ~((time > gap_start[pair]) & (time < (gap_start + length)[pair]))
     speed = np.linalg.norm(sensor_velocity, axis=-1)
-    metres = {
-        "x": measured[..., 0],
-        "y": measured[..., 1],
-        "z": height,
-        "velocity": speed,
-    }
+    metres = np.stack([*np.moveaxis(measured, -1, 0), height, speed])
+    millimetres = np.rint(1000 * metres).astype(np.int32)
     columns = {
-        "time": np.broadcast_to(frames[:, None], is_recorded.shape),
+        "time": np.broadcast_to(time, is_recorded.shape),
         "id": FIRST_ID + ID_STEP * (2 * pair[:, None] + np.arange(2)),
-        **{
-            name: np.rint(1000 * value).astype(np.int32)
-            for name, value in metres.items()
-        },
+        **dict(zip(("x", "y", "z", "velocity"), millimetres, strict=True)),
         "motion_angle": np.arctan2(sensor_velocity[..., 1], sensor_velocity[..., 0]),
         "facing_angle": wrap_angle(facing),
     }

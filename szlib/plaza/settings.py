@@ -112,46 +112,37 @@ class PlazaSettings:
     date: str = "2000-01-02"
 
     def __post_init__(self) -> None:
-        (low, high) = self.speeds
-        nearest = self.intruder_distances
-        speed = self.intruder_speeds
-        shares = (self.standing, self.together, self.intruders)
-        gaps = (self.short_gaps, self.long_gaps)
-        for names, values in (
-            ("standing, together, intruders", shares),
-            ("short_gaps, long_gaps", gaps),
-        ):
-            require(
-                min(values) >= 0 and sum(values) <= 1,
-                names,
-                values,
-                "shares, in sum at most 1",
-            )
-        require(self.n_encounters >= 1, "n_encounters", self.n_encounters, "at least 1")
-        longest = f"{WINDOW} to {_LONGEST_TRACKED:g} s"
-        require(
-            WINDOW <= self.tracked <= _LONGEST_TRACKED, "tracked", self.tracked, longest
-        )
-        for name, metres in (("clearance", self.clearance), ("noise", self.noise)):
-            require(0 <= metres < np.inf, name, metres, "at least 0 m")
+        low, high = self.speeds
+        nearest, farthest = self.intruder_distances
+        slowest, fastest = self.intruder_speeds
         top = self.max_speed
-        is_range = MIN_WALKING_SPEED <= low < high <= top < np.inf
-        expected = (
-            f"(lowest, highest), from {MIN_WALKING_SPEED} m/s to max_speed = {top} m/s"
-        )
-        require(is_range, "speeds", self.speeds, expected)
-        is_range = 0 < nearest[0] <= nearest[1] < np.inf
-        require(
-            is_range,
-            "intruder_distances",
-            nearest,
-            "(smallest, largest), both positive [m]",
-        )
-        is_range = (
-            0 < speed[0] <= speed[1] >= _MIN_INTRUDER_SPEED and speed[0] < 2 * top
-        )
-        expected = f"(lowest, highest), between 0 and {2 * top} m/s and at least {_MIN_INTRUDER_SPEED} m/s"
-        require(is_range, "intruder_speeds", speed, expected)
+        checks = {
+            "n_encounters": (self.n_encounters >= 1, "at least 1"),
+            "tracked": (
+                WINDOW <= self.tracked <= _LONGEST_TRACKED,
+                f"{WINDOW} to {_LONGEST_TRACKED:g} s",
+            ),
+            "clearance": (0 <= self.clearance < np.inf, "at least 0 m"),
+            "noise": (0 <= self.noise < np.inf, "at least 0 m"),
+            "speeds": (
+                MIN_WALKING_SPEED <= low < high <= top < np.inf,
+                f"(lowest, highest), from {MIN_WALKING_SPEED} m/s to max_speed = {top} m/s",
+            ),
+            "intruder_distances": (
+                0 < nearest <= farthest < np.inf,
+                "(smallest, largest), both positive [m]",
+            ),
+            "intruder_speeds": (
+                0 < slowest <= fastest >= _MIN_INTRUDER_SPEED and slowest < 2 * top,
+                f"(lowest, highest), between 0 and {2 * top} m/s and at least {_MIN_INTRUDER_SPEED} m/s",
+            ),
+        }
+        for names in ("standing, together, intruders", "short_gaps, long_gaps"):
+            shares = [getattr(self, name) for name in names.split(", ")]
+            are_shares = min(shares) >= 0 and sum(shares) <= 1
+            require(are_shares, names, shares, "shares, in sum at most 1")
+        for name, (is_valid, expected) in checks.items():
+            require(is_valid, name, getattr(self, name), expected)
         needed = np.hypot(swept_length(high), SPACE.width) + 2 * MARGIN
         given = min(np.ptp(self.area.x), np.ptp(self.area.y))
         if given < needed:
@@ -160,9 +151,13 @@ class PlazaSettings:
                 f"got {given:.1f} m; use a larger area or slower walkers"
             )
         self.compute_start_time()
-        zones = map(self.true_zone, np.linspace(low, high, 3))
         reach = ellipse_reach(
-            np.array([(*zone.center, *zone.semi_axes, zone.angle) for zone in zones])
+            np.array(
+                [
+                    (*zone.center, *zone.semi_axes, zone.angle)
+                    for zone in map(self.true_zone, np.linspace(low, high, 3))
+                ]
+            )
         )
         if not (reach < R_MAX).all():  # NaN where a zone does not contain the person
             raise ZoneError(
@@ -180,17 +175,12 @@ class PlazaSettings:
         slow = self.slow_zone
         fast = self.fast_zone
         share = (speed - _LOW_SPEED) / (_HIGH_SPEED - _LOW_SPEED)
-        turn = Ellipse(
-            (0, 0), (1, 1), fast.angle - slow.angle
-        ).angle  # the shorter rotation
-        center, semi_axes = (
-            np.add(start, share[..., None] * np.subtract(end, start))
-            for start, end in (
-                (slow.center, fast.center),
-                (slow.semi_axes, fast.semi_axes),
-            )
-        )
-        return center, semi_axes, slow.angle + share * turn
+        # the shorter rotation
+        turn = Ellipse((0, 0), (1, 1), fast.angle - slow.angle).angle
+        part = share[..., None]
+        center = np.add(slow.center, part * np.subtract(fast.center, slow.center))
+        growth = np.subtract(fast.semi_axes, slow.semi_axes)
+        return center, slow.semi_axes + part * growth, slow.angle + share * turn
 
     def compute_start_time(self) -> float:
         """Compute the time at which the first pair comes [s since 1970]."""

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
+from studies import plaza_truth
 from studies.pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
 
 import szlib
@@ -22,7 +23,7 @@ def plazas() -> list[pd.DataFrame]:
     """Six default plazas, together as large as the paper's data; each is staged once for file and kinds."""
     staged = cache(stage_encounters)
     with pytest.MonkeyPatch.context() as patch:
-        for module in (accuracy, generation):
+        for module in (plaza_truth, generation):
             patch.setattr(module, "stage_encounters", staged)
         return [plaza_samples(seed, szlib.PlazaSettings()) for seed in range(6)]
 
@@ -45,10 +46,10 @@ def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> Non
     with pytest.raises(
         szlib.DataError, match=r"row \d+: .* no pair of a plaza of 40 encounters"
     ):
-        accuracy.true_kinds(plazas[0], settings=szlib.PlazaSettings(n_encounters=40))
+        plaza_truth.true_kinds(plazas[0], settings=szlib.PlazaSettings(n_encounters=40))
     strangers = plazas[0].assign(other_id=plazas[0]["other_id"] + 400)
     with pytest.raises(szlib.DataError, match=r"row 0: .* no pair"):
-        accuracy.true_kinds(strangers)
+        plaza_truth.true_kinds(strangers)
 
 
 def test_precision_and_recall() -> None:
@@ -74,7 +75,7 @@ def test_precision_and_recall() -> None:
 def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
     zone, truth = (
         szlib.SocialZone.fit(
-            plazas[0], method="hull", speeds=accuracy.SPEEDS, n_resamples=0
+            plazas[0], method="hull", speeds=plaza_truth.SPEEDS, n_resamples=0
         ),
         szlib.PlazaSettings(),
     )
@@ -85,19 +86,19 @@ def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) ->
                 [*t.center, *t.semi_axes],
             )
         )
-        for v, t in ((v, truth.true_zone(v)) for v in accuracy.SPEEDS)
+        for v, t in ((v, truth.true_zone(v)) for v in plaza_truth.SPEEDS)
     ]
-    assert accuracy.largest_error(zone) == np.max(off)
-    assert accuracy.largest_error(zone, speeds=(1.1,)) == np.max(off[2])
+    assert plaza_truth.largest_error(zone) == np.max(off)
+    assert plaza_truth.largest_error(zone, speeds=(1.1,)) == np.max(off[2])
     larger = szlib.PlazaSettings(
         slow_zone=szlib.Ellipse((0.04, 0.0), (0.98, 0.78)),
         fast_zone=szlib.Ellipse((0.06, 0.0), (1.1, 0.88)),
     )
-    assert accuracy.largest_error(zone, larger) == pytest.approx(
-        0.1, abs=accuracy.largest_error(zone)
+    assert plaza_truth.largest_error(zone, larger) == pytest.approx(
+        0.1, abs=plaza_truth.largest_error(zone)
     )
     with pytest.raises(szlib.ZoneError, match="at 5 m/s is undefined"):
-        accuracy.largest_error(zone, speeds=(5.0,))
+        plaza_truth.largest_error(zone, speeds=(5.0,))
 
 
 # --- what they say -----------------------------------------------------------------------------------
@@ -108,12 +109,12 @@ def test_the_pipeline_finds_the_true_zone(
     plazas: list[pd.DataFrame], seed: int
 ) -> None:
     zone = szlib.SocialZone.fit(
-        plazas[seed], method="hull", speeds=accuracy.SPEEDS, n_resamples=0
+        plazas[seed], method="hull", speeds=plaza_truth.SPEEDS, n_resamples=0
     )
-    assert accuracy.largest_error(zone) < 0.05
+    assert plaza_truth.largest_error(zone) < 0.05
     turned = [
         zone.ellipse(v).angle - szlib.PlazaSettings().true_zone(v).angle
-        for v in accuracy.SPEEDS
+        for v in plaza_truth.SPEEDS
     ]
     assert np.abs((np.degrees(turned) + 90) % 180 - 90).max() < 10
 
