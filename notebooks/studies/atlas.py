@@ -17,7 +17,7 @@ from typing import Any
 import joblib
 import numpy as np
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 
 from szlib.control.mpc import MPCCBF
 from szlib.control.settings import MPCSettings
@@ -93,6 +93,7 @@ class AtlasCell:
         return simulate(self.scenario(), self.controller(zone))
 
 
+@study("27_atlas", notebook="27", has_probe=False)
 def run_atlas(cells: Sequence[AtlasCell], zone: Ellipse, *, n_jobs: int = 1) -> pd.DataFrame:
     """Run each cell of an atlas.
 

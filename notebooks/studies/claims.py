@@ -27,7 +27,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from scipy.stats import t as student_t
 from studies import paper_claims as claims
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.plaza_truth import true_kinds
 from studies.respect import stored
 
@@ -135,6 +135,7 @@ def pool_sites(table: pd.DataFrame) -> pd.DataFrame:
     )
 
 
+@study("25_claims", notebook="25")
 def recompute(row: pd.Series) -> dict[str, float]:
     """Effect, number and probe of a row of the plaza, again."""
     samples, null = find_both("plaza")
@@ -243,6 +244,7 @@ VARIED: dict[str, Mapping[str, Sequence[float]]] = {
 """Options of each method that are varied, and their values besides the defaults."""
 
 
+@study("25_sensitivity", notebook="25", has_probe=False)
 def move_zone(name: str, methods: Iterable[str] = tuple(VARIED)) -> Iterator[pd.DataFrame]:
     """What moves the zone of a site, method by method."""
     load, square = SITES[name]
@@ -305,7 +307,7 @@ def main() -> None:
             table = pd.concat([table, pool_sites(table)])
         else:
             table = pd.concat([part for name in ("ATC day", "plaza") for part in move_zone(name)])
-    write_table(table, f"16_{asked.study}")
+    write_table(table, f"25_{asked.study}")
     print(table.to_string())
 
 

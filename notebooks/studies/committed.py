@@ -1,4 +1,7 @@
-"""How a study writes its table: with the command, the seed and the commit that made it."""
+"""The studies: their tables, the notebooks that show them, and how a table is written.
+
+A table has the command, the seed and the commit that made it. `STUDIES` has every table of a module that was imported.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,10 @@ import json
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -14,8 +20,43 @@ from szlib.core.files import write_file
 from szlib.workbook.record import TABLES
 
 
+@dataclass(frozen=True)
+class Study:
+    """A committed table: its name, the number of the notebook that shows it, and the module of the study.
+
+    `probe` computes a row again, or is None where a row takes too long.
+    """
+
+    table: str
+    notebook: str
+    module: str
+    probe: Callable[..., Any] | None
+
+
+STUDIES: dict[str, Study] = {}
+
+
+def study(*tables: str, notebook: str, has_probe: bool = True) -> Callable[[Any], Any]:
+    """Register `tables` of a module, shown in `notebook`, by the function that computes a row of them again.
+
+    Without `has_probe` it is the function that makes them.
+    """
+
+    def register(function: Any) -> Any:
+        """Add the tables to `STUDIES`, and return the function as it is."""
+        module, probe = Path(function.__code__.co_filename).stem, function if has_probe else None
+        STUDIES.update({name: Study(name, notebook, module, probe) for name in tables})
+        return function
+
+    return register
+
+
 def write_table(table: pd.DataFrame, name: str, *, seed: int = 0) -> None:
     """Write `table` as `name`.csv to `TABLES`, with the command that runs, the `seed` and the commit."""
+    if name not in STUDIES:
+        raise KeyError(
+            f"{name}: register the table with @study, as studies.committed says; known are {[*STUDIES]}"
+        )
     script, *arguments = sys.argv
     command = shlex.join(["python", "-m", f"studies.{Path(script).stem}", *arguments])
     header = json.dumps({"command": command, "seed": seed, "commit": _describe_commit()})

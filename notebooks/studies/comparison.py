@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from studies import summaries
 from studies.atlas import REFERENCE
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.literature_zones import compare
 
 from szlib.simulation.monte_carlo import BEHAVIOURS, FORMULATIONS, WORLDS
@@ -27,6 +27,7 @@ PROBE = 3
 """The world that is driven again in each run of notebook 23: barriers bind there, and the zones differ."""
 
 
+@study("23_comparison", notebook="23")
 def recompute(row: pd.Series) -> dict[str, float]:
     """The world `PROBE` of a row, again, without a time limit: the same on every machine."""
     settings = replace(FORMULATIONS[row["formulation"]], time_limit=np.inf)
@@ -37,6 +38,7 @@ def recompute(row: pd.Series) -> dict[str, float]:
     return {"probe": rows[row["metric"]].iloc[0]}
 
 
+@study("23_paired", notebook="23")
 def recompute_paired(row: pd.Series) -> dict[str, float]:
     """The world `PROBE` of a row less that of its rival, again."""
     own, rival = (recompute(each)["probe"] for each in (row, pd.Series({**row, **RIVAL})))

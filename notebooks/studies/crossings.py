@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 import pyrvo
 from scipy.stats import binomtest
-from studies.committed import write_table
+from studies.committed import study, write_table
 
 import szlib
 from szlib.control.controller import Controller, advance
@@ -159,6 +159,7 @@ def find_robot(controller: str, zone: str, dt: float, a_max: float) -> OrcaRobot
     return SzlibRobot(make(SCENARIO, find_settings(controller, dt, a_max)), ZONES[zone], dt)
 
 
+@study("29_crossings", notebook="29")
 def recompute(row: pd.Series) -> dict[str, float]:
     """When the crossing of the first world of a row ends, again."""
     return {"probe": cross(FIRST, find_robot(*row[list(BY)]))[1]}

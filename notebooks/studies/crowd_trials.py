@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from studies.claims import SITES
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.replay import ReplacedWalker, Replays, find_replays
 from studies.safety_claims import MOTION_CHANGES, safety_violations
 from studies.social_metrics import compute_replay_metrics
@@ -153,11 +153,13 @@ def probe(row: pd.Series) -> pd.Series:
     return react(1, factories()[row["crowd"]], row["sees"], factory, settings, seed=PROBE).iloc[0]
 
 
+@study("29_crowds", notebook="29")
 def recompute(row: pd.Series) -> dict[str, float]:
     """The trial `PROBE` of a row of the means, again."""
     return {"probe": probe(row)[row["metric"]]}
 
 
+@study("29_safety_claims", notebook="29")
 def recompute_promises(row: pd.Series) -> dict[str, float]:
     """The steps of the trial `PROBE` that claimed to be safe, and its path, again."""
     again = probe(row)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.distances import euclidean_to_ellipse, euclidean_to_segment
 from studies.rollout_table import interval
 
@@ -164,6 +164,7 @@ def probe(name: str, robot: str) -> dict[str, float]:
     return {"probe path": float(first["path_length"].sum()), "probe zone": float(first["fine_zone"].min())}
 
 
+@study("29_differential", notebook="29")
 def recompute(row: pd.Series) -> dict[str, float]:
     return probe(row["set"], row["robot"])
 

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 
 import szlib
 from szlib.simulation.monte_carlo import RolloutSetup
@@ -37,6 +37,7 @@ def drive_cells(cells: Iterable[tuple[float, int, float]], worlds: int, **more: 
     return pd.DataFrame(table)
 
 
+@study("21_feasibility", notebook="21")
 def recompute(row: pd.Series) -> dict[str, float]:
     """The path in the first worlds of a cell, again."""
     again = drive_cells([(row["gamma"], int(row["N_h"]), row["a_max"])], FIRST, progress=False)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.rollout_table import interval
 
 import szlib
@@ -52,6 +52,7 @@ def probe(gamma: float) -> float:
     return float(one["path_length"] + one["min_h"])
 
 
+@study("09_gamma", notebook="09")
 def recompute(row: pd.Series) -> dict[str, float]:
     return {"probe": probe(row["gamma"])}
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 
 import szlib
 from szlib.tracks import quality
@@ -30,6 +30,7 @@ def of_plaza() -> pd.DataFrame:
         return count_visits([szlib.make_plaza(Path(folder) / "plaza.csv", seed=0, settings=SMALL)])
 
 
+@study("24_hours", notebook="24")
 def recompute(row: pd.Series) -> dict[str, float]:
     """A row of the plaza, again."""
     return of_plaza().set_index("hour").loc[row["hour"]].to_dict()

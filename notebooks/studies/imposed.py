@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.respect import data_and_null
 
 import szlib
@@ -125,6 +125,7 @@ def draw_case(
     return crowd[crowd["encounter"].isin(drawn)], kept
 
 
+@study("25_imposed", notebook="25")
 def recompute(row: pd.Series) -> dict[str, object]:
     """A row of the plaza, again."""
     null = plaza_null()

@@ -19,7 +19,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 
 import szlib
 from szlib.encounters import Extraction
@@ -77,6 +77,7 @@ def measure(task: str, days: list[Path], folder: Path) -> dict[str, float]:
     return found | {"memory_mb": peak / 1024}
 
 
+@study("24_many_days", notebook="24", has_probe=False)
 def measure_all(folder: str) -> pd.DataFrame:
     """Run every task in a process of its own."""
     rows = []

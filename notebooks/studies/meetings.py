@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from studies.atlas import REFERENCE
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.social_metrics import compute_social_metrics
 from studies.summaries import summarise
 
@@ -68,12 +68,14 @@ def meet(
     return pd.concat(tables)
 
 
+@study("26_meetings", notebook="26")
 def recompute(row: pd.Series) -> dict[str, float]:
     """The first variation of a row, again, without a time limit: the same on every machine."""
     again = {"meetings": [row["meeting"]], "time_limit": np.inf, "progress": False}
     return {"first": meet(row["controller"], REFERENCE, 1, **again)[row["metric"]].iloc[0]}
 
 
+@study("26_meetings_paired", notebook="26")
 def recompute_paired(row: pd.Series) -> dict[str, float]:
     """The first variation of a row less that of its rival, again."""
     own, rival = (recompute(each)["first"] for each in (row, pd.Series({**row, **RIVAL})))

@@ -19,7 +19,7 @@ from itertools import product
 from pathlib import Path
 
 import pandas as pd
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.respect import stored
 
 import szlib
@@ -123,6 +123,7 @@ def compare(
             yield {"method": method, "quantity": name} | found
 
 
+@study("25_plazas", notebook="25")
 def recompute(row: pd.Series) -> dict[str, object]:
     """A row of the smallest plaza, again."""
     asked = (row["method"], row["quantity"])

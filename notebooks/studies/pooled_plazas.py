@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from studies import plaza_truth
-from studies.committed import write_table
+from studies.committed import study, write_table
 from tqdm import tqdm
 
 import szlib
@@ -78,6 +78,7 @@ def judged(
     return {"removed": removed.mean(), "precision": precision, "recall": recall, "error": error}
 
 
+@study("03_outliers", notebook="03")
 def recompute(row: pd.Series) -> dict[str, float]:
     """What a rule does to a single plaza, again."""
     settings = szlib.PlazaSettings(intruders=row["intruders"], intruder_speeds=PACES[row["pace"]])

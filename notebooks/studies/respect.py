@@ -25,7 +25,7 @@ import joblib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
@@ -68,9 +68,9 @@ def main() -> None:
         "--cache", type=Path, default=Path("../results/null"), help="where null models are stored"
     )
     asked = parser.parse_args()
-    study = {"nobody": nobody, "sites": sites, "n-curve": n_curve, "changes": changes}[asked.study]
-    table = pd.DataFrame(study(asked))
-    write_table(table, f"15_{asked.study.replace('-', '_')}")
+    make = {"nobody": nobody, "sites": sites, "n-curve": n_curve, "changes": changes}[asked.study]
+    table = pd.DataFrame(make(asked))
+    write_table(table, f"06_{asked.study.replace('-', '_')}")
     print(table.to_string())
 
 
@@ -99,6 +99,7 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     return rows
 
 
+@study("06_nobody", notebook="06")
 def recompute_nobody(row: pd.Series) -> dict[str, object]:
     """A row, again."""
     return {each["kinds"]: each for each in one_crowd(int(row["seed"]), int(row["bunch"]))}[row["kinds"]]
@@ -293,6 +294,7 @@ def radius(data: pd.DataFrame, null: szlib.NullEncounters) -> float:
         return np.nan
 
 
+@study("06_sites", notebook="06")
 def recompute_sites(row: pd.Series) -> dict[str, float]:
     """A row of the plaza, again, without the reach in four directions."""
     samples, null = find_both("plaza")
@@ -337,6 +339,7 @@ def describe_draws(data: pd.DataFrame, null: szlib.NullEncounters, n: int, times
     return row
 
 
+@study("06_n_curve", notebook="06")
 def recompute_n_curve(row: pd.Series) -> dict[str, float]:
     """A row of the plaza, again."""
     samples, null = find_both("plaza")
@@ -404,6 +407,7 @@ def describe_change(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str,
     return {"encounters": test.n_encounters, **describe_radius(test, "radius")}
 
 
+@study("06_changes", notebook="06")
 def recompute_changes(row: pd.Series) -> dict[str, float]:
     """A row of the plaza, again."""
     samples, null = find_both("plaza")

@@ -15,7 +15,7 @@ from typing import Any, get_args
 import numpy as np
 import pandas as pd
 from scipy.stats import beta
-from studies.committed import write_table
+from studies.committed import study, write_table
 
 import szlib
 from szlib.control.settings import TOLERANCE
@@ -102,6 +102,7 @@ def probe(worlds: Worlds, formulation: str) -> float:
     return float(one["path_length"] + one["min_h"])
 
 
+@study("21_rollouts", notebook="21")
 def recompute(row: pd.Series) -> dict[str, float]:
     return {"probe": probe(SETS[row["set"]][0], row["formulation"])}
 

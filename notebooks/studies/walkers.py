@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 from studies.claims import SITES
-from studies.committed import write_table
+from studies.committed import study, write_table
 from studies.crowd_trials import zone_of
 from studies.replay import TIME_FACTOR, ReplacedWalker, Replay, find_replays
 from studies.social_metrics import REACHED, compute_replay_metrics
@@ -113,6 +113,7 @@ def trials(
         yield {"seed": seed} | measure(at, robot)
 
 
+@study("29_walkers", notebook="29")
 def recompute(row: pd.Series) -> dict[str, float]:
     """The first way of a row, driven again."""
     settings = SETTINGS.get(row["controller"], SETTINGS["MPC-CBF"])
@@ -139,6 +140,7 @@ def means(rows: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     return summarise(rows, by=by, metrics=METRICS).rename(columns={"first": "probe"})
 
 
+@study("29_sensitivity", notebook="29", has_probe=False)
 def main(n: int) -> None:
     parts = []
     for rows in compare(n):

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from studies.claims import SITES
-from studies.committed import write_table
+from studies.committed import study, write_table
 
 import szlib
 from szlib.plaza.settings import PlazaSettings
@@ -127,6 +127,7 @@ def probe_of_coverage(truth: str, method: str) -> pd.Series:
     return half_widths(intervals)
 
 
+@study("25_coverage", "25_coverage_hull", notebook="25")
 def recompute_coverage(row: pd.Series) -> dict[str, float]:
     return {"probe": probe_of_coverage(row["plaza"], row["method"])[row["quantity"], row["speed"]]}
 
@@ -151,6 +152,7 @@ def outside(clearance: float, q: float, plazas: int, **more: Any) -> np.ndarray:
     return np.mean(off, axis=0)
 
 
+@study("25_levels", notebook="25")
 def recompute_levels(row: pd.Series) -> dict[str, float]:
     return {"probe": outside(row["clearance"], row["q"], 1, n_encounters=SMALL)[0]}
 
@@ -180,6 +182,7 @@ def judge(samples: pd.DataFrame, known: PlazaSettings, method: str) -> dict[str,
     return {"encounters": samples["encounter"].nunique(), "error_m": error(zone, known)}
 
 
+@study("25_estimators", notebook="25")
 def recompute_estimators(row: pd.Series) -> dict[str, float]:
     samples, _, known = people(int(row["seed"]), **CASES[row["case"]])
     return judge(samples, known, row["method"])
@@ -204,6 +207,7 @@ def judge_pooled(days: list[pd.DataFrame]) -> dict[str, float]:
     }
 
 
+@study("25_sizes", notebook="25")
 def recompute_sizes(row: pd.Series) -> dict[str, float]:
     return judge_pooled([people(seed)[0] for seed in range(int(row["plazas"]))])
 
@@ -241,6 +245,7 @@ def fit_subsets(samples: pd.DataFrame, share: float, draws: int, method: str) ->
     return {"zones": len(found), **dict(zip(ends, quartiles.T.ravel(), strict=True))}
 
 
+@study("25_subsets", notebook="25")
 def recompute_subsets(row: pd.Series) -> dict[str, float]:
     """A row of the plaza, again."""
     samples = people(0, n_encounters=SMALL)[0]
@@ -251,7 +256,7 @@ STUDIES = (coverage, levels, estimators, sizes, subsets)
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", szlib.DataWarning)
-    study, *given = sys.argv[1:]
-    table = {each.__name__: each for each in STUDIES}[study](*(int(x) if x.isdigit() else x for x in given))
-    method = f"_{given[0]}" if study == "coverage" and given[0] != "quantile" else ""
-    write_table(table, f"16_{study}{method}")
+    asked, *given = sys.argv[1:]
+    table = {each.__name__: each for each in STUDIES}[asked](*(int(x) if x.isdigit() else x for x in given))
+    method = f"_{given[0]}" if asked == "coverage" and given[0] != "quantile" else ""
+    write_table(table, f"25_{asked}{method}")

@@ -1,0 +1,38 @@
+"""Each committed table belongs to one study, which names its notebook, its module and its probe."""
+
+import importlib
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from studies import committed
+
+from szlib.workbook import folders
+from szlib.workbook.record import TABLES
+
+FOLDER = Path(committed.__file__).parent
+for module in sorted(FOLDER.glob("[a-z]*.py")):
+    importlib.import_module(f"studies.{module.stem}")
+TEXTS = {script.stem[:2]: script.read_text() for script in folders.list_notebooks()}
+
+
+def test_the_tables_are_those_of_the_studies():
+    assert {file.stem for file in TABLES.glob("*.csv")} == set(committed.STUDIES)
+
+
+@pytest.mark.parametrize("name", sorted(committed.STUDIES))
+def test_a_table_is_made_by_its_module_and_shown_in_its_notebook(name):
+    study = committed.STUDIES[name]
+    header = json.loads((TABLES / f"{name}.csv").read_text().splitlines()[0][2:])
+    assert header["command"].split()[2] == f"studies.{study.module}"
+    assert name.startswith(f"{study.notebook}_")
+    text = TEXTS[study.notebook]
+    assert name in text or f"{study.module}.TABLE" in text or "coverage" in name
+    if study.probe:
+        assert study.probe.__name__ in text
+
+
+def test_a_table_that_no_study_registered_is_not_written():
+    with pytest.raises(KeyError, match="16_claims: register the table with @study"):
+        committed.write_table(pd.DataFrame(), "16_claims")
