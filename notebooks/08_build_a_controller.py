@@ -549,6 +549,40 @@ wishes = [(v := choose_speed(2.0, room)[0]) <= 0.5 * room + 1e-9 and v >= 0 for 
 record.check("the goal gives way, the barrier does not", all(wishes), wishes, always=True)
 
 # %% [markdown]
+# ## Try it: how far ahead the barrier looks
+#
+# Nothing has to be installed for this: the runs are recorded in the page. Choose, press *play*, step, or move the time
+# line. The green area holds all accelerations that the robot may choose then, and the sentence says why it chose this one.
+#
+# **What do you think?** A person comes at 0.8 m/s. gamma grows from 0.05 to 0.8. How many steps ahead, $N_h$, keep h positive? Write it down, then look.
+
+# %% jupyter={"source_hidden": true}
+# The recorded laboratory
+from laboratory import PRESETS, Axis, Recording, RobotOptions, World
+
+
+def look_ahead(gamma, n_h):
+    scene = replace(PRESETS["passing"], people=(szlib.Person((4.0, 0.3), (-0.8, 0.0)),))
+    return World(scene, zone, [RobotOptions(changes={"gamma": gamma, "N_h": n_h})])
+
+
+axes = [Axis("gamma", "gamma", (0.05, 0.2, 0.8), 1), Axis("n_h", "N_h [steps]", (1, 2, 8))]
+recording = Recording("A person comes, with a barrier on some steps", look_ahead, axes, longest=14.0)
+recording
+
+# %% jupyter={"source_hidden": true}
+# The answer
+low = {(row["gamma"], row["n_h"]): row["least_h"] for row in recording.table}
+Markdown(
+    "<details><summary>Answer</summary>\n\nThe least h, with $N_h$ = 1, 2 and 8, is "
+    + "; ".join(
+        f"{', '.join(f'{low[g, n]:.2f}' for n in (1, 2, 8))} m with gamma = {g:g}" for g in (0.05, 0.2, 0.8)
+    )
+    + ". The larger gamma, the later the robot brakes, and the farther it has to look.\n\n</details>"
+)
+
+
+# %% [markdown]
 # ## The paper's eq. 2 next to ours
 #
 # - *The errors.* The paper writes $\mathbf x_k^\top Q\,\mathbf x_k$; here it is $\mathbf e_k$. With $\mathbf x_k$ every

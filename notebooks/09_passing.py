@@ -368,6 +368,44 @@ def run_with(gamma):
 show_sliders(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
 
 # %% [markdown]
+# ## Try it: gamma and the place of the person
+#
+# Nothing has to be installed for this: the runs are recorded in the page. Choose, press *play*, step, or move the time
+# line. The green area holds all accelerations that the robot may choose then, and the sentence says why it chose this one.
+#
+# **What do you think?** The person stands on the path, or up to 0.8 m beside it. Which robot turns aside last, and which one arrives
+# first? Write it down, then look.
+
+# %% jupyter={"source_hidden": true}
+# The recorded laboratory
+from laboratory import PRESETS, Axis, Recording, RobotOptions, World
+
+
+def stand_beside(gamma, offset):
+    person = szlib.Person((0.0, offset), heading=np.pi)
+    return World(
+        replace(PRESETS["passing"], people=(person,)), zone, [RobotOptions(changes={"gamma": gamma})]
+    )
+
+
+axes = [
+    Axis("gamma", "gamma", (0.03, 0.05, 0.1, 0.3), 1),
+    Axis("offset", "person beside the path [m]", (0.0, 0.4, 0.8)),
+]
+recording = Recording("Passing a person who stands", stand_beside, axes)
+recording
+
+# %% jupyter={"source_hidden": true}
+# The answer
+times = {row["gamma"]: row["time"] for row in recording.table if row["offset"] == 0.0}
+Markdown(
+    "<details><summary>Answer</summary>\n\nThe robot with the largest gamma turns last. With the person on the path they arrive after "
+    + ", ".join(f"{time or np.nan:.1f} s (gamma = {gamma:g})" for gamma, time in times.items())
+    + ".\n\n</details>"
+)
+
+
+# %% [markdown]
 # ## A common mistake
 #
 # **"The barrier makes the robot go around."** No. It makes the robot slow. The robot goes around only if something else

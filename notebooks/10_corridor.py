@@ -29,7 +29,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [09](09_passing.ipynb) · next: [11 - Yielding: waiting and making
-# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 20 min · needs
+# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 25 min · needs
 # [09](09_passing.ipynb) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.
@@ -275,6 +275,39 @@ Markdown(
     f"{100 * free_room(3.8):.0f} cm of room: with so little h the robot may hardly move, and the person is there before it has "
     f"squeezed by. In the widest corridor it goes {found[8.0]['min_speed']:.2f} m/s at the slowest, as beside a person in the "
     f"open ({slowest['person alone']:.2f} m/s).\n\n</details>"
+)
+
+# %% [markdown]
+# ## Try it: width and pace
+#
+# Nothing has to be installed for this: the runs are recorded in the page. Choose, press *play*, step, or move the time
+# line. The green area holds all accelerations that the robot may choose then, and the sentence says why it chose this one.
+#
+# **What do you think?** The corridor is 3.8 to 5 m wide, and the person comes at 0.3 to 0.7 m/s. Where does the robot leave the corridor to the
+# person? Write it down, then look.
+
+# %% jupyter={"source_hidden": true}
+# The recorded laboratory
+from laboratory import Axis, Recording, World
+
+
+def meet_in_corridor(width, pace):
+    walls = np.array([[(-6.0, y), (7.0, y)] for y in (width / 2, -width / 2)])
+    person = szlib.Person((4.0, 0.0), (-pace, 0.0))
+    return World(replace(szlib.SCENARIOS["corridor"], people=(person,), walls=walls), zone)
+
+
+axes = [Axis("width", "width [m]", (3.8, 4.4, 5.0), 1), Axis("pace", "pace [m/s]", (0.3, 0.7))]
+recording = Recording("A person in a corridor", meet_in_corridor, axes, every=3)
+recording
+
+# %% jupyter={"source_hidden": true}
+# The answer
+times = ((f"{row['width']:g} m, {row['pace']:g} m/s", row["time"]) for row in recording.table)
+Markdown(
+    "<details><summary>Answer</summary>\n\nThe narrower the corridor, the later it arrives: "
+    + "; ".join(f"{what}: {f'{time:.1f} s' if time else 'not within 30 s'}" for what, time in times)
+    + ". It lets the person out first where the two do not fit side by side.\n\n</details>"
 )
 
 # %% [markdown]

@@ -356,6 +356,37 @@ record.check("h >= 0 with every chain of settings", lowest.min() >= 0, f"least h
 # the reason why our robot passes on the right: the rule of the side is.
 
 # %% [markdown]
+# ## Try it: who goes first
+#
+# Nothing has to be installed for this: the runs are recorded in the page. Choose, press *play*, step, or move the time
+# line. The green area holds all accelerations that the robot may choose then, and the sentence says why it chose this one.
+#
+# **What do you think?** The passage is 1.6 to 2.4 m wide, and the person comes at 0.3 to 0.8 m/s. Where does the robot wait longest? Write it down, then look.
+
+# %% jupyter={"source_hidden": true}
+# The recorded laboratory
+from laboratory import Axis, Recording, World
+
+
+def meet_at_passage(width, pace):
+    return World(AtlasCell("waiting", width=width, pace=pace).scenario(), zone)
+
+
+zone = record.cache.ellipse()
+axes = [Axis("width", "width [m]", (1.6, 2.4)), Axis("pace", "pace [m/s]", (0.3, 0.5, 0.8), 1)]
+recording = Recording("A person comes out of a passage", meet_at_passage, axes, every=3)
+recording
+
+# %% jupyter={"source_hidden": true}
+# The answer
+times = ((f"{row['width']:g} m, {row['pace']:g} m/s", row["time"]) for row in recording.table)
+Markdown(
+    "<details><summary>Answer</summary>\n\nIt arrives later, the slower the person and the narrower the passage: "
+    + "; ".join(f"{what}: {f'{time:.1f} s' if time else 'not within 30 s'}" for what, time in times)
+    + ". It goes on when the person is out.\n\n</details>"
+)
+
+# %% [markdown]
 # ## Three common mistakes
 #
 # - **"The robot knows that the person goes first."** No. It knows a zone, some walls and 0.8 s. Who goes first

@@ -597,6 +597,48 @@ what = "a goal amid a group is not reached, nobody is touched, and the step says
 record.check(what, arrived == 0 and gap > 0 and blocked, f"{arrived} of 2 arrive; least gap {gap:.2f} m")
 
 # %% [markdown]
+# ## Try it: which door
+#
+# Nothing has to be installed for this: the runs are recorded in the page. Choose, press *play*, step, or move the time
+# line. The green area holds all accelerations that the robot may choose then, and the sentence says why it chose this one.
+#
+# **What do you think?** A person stands in or beside the nearer door. How far aside must they stand for the robot to take it? Does it depend on how
+# far away the other door is? Write it down, then look.
+
+# %% jupyter={"source_hidden": true}
+# The recorded laboratory
+from laboratory import PRESETS, Axis, Recording, RobotOptions, World
+
+
+def choose_door(aside, door):
+    wall = [[(2.0, y), (2.0, z)] for y, z in ((-2.0, -0.9), (0.9, door - 0.9), (door + 0.9, 6.5))]
+    sides = [[(-4.0, y), (7.0, y)] for y in (-2.0, 6.5)]
+    person = szlib.Person((2.0, aside), heading=np.pi)
+    scene = replace(PRESETS["two_doors"], people=(person,), walls=np.array(wall + sides))
+    return World(scene, zone, [RobotOptions("MPCSettings.among_people")])
+
+
+axes = [
+    Axis("aside", "person at y [m]", (0.0, -0.9, -1.6)),
+    Axis("door", "middle of the other door [m]", (3.3, 4.5)),
+]
+recording = Recording("Two doors", choose_door, axes, every=3)
+recording
+
+# %% jupyter={"source_hidden": true}
+# The answer
+rows = [
+    f"y = {r['aside']:g} m, door at {r['door']:g} m: " + (f"{r['time']:.1f} s" if r["time"] else "no arrival")
+    for r in recording.table
+]
+Markdown(
+    "<details><summary>Answer</summary>\n\nWatch the path. The times are "
+    + "; ".join(rows)
+    + ".\n\n</details>"
+)
+
+
+# %% [markdown]
 # ## All of it in one table
 
 

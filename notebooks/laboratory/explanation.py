@@ -119,7 +119,7 @@ def _describe_limits(step: szlib.Step, active: tuple[BarrierLimit, ...]) -> str:
     for limit in active:
         row = limit.row
         is_closing = float(closing[row]) >= _SLIGHT
-        motion = f"comes closer at {closing[row]:.1f} m/s" if is_closing else "does not come closer"
+        motion = f"comes closer at {closing[row]:.1f} m/s" if is_closing else "limits what it may do next"
         when = f", at its limit in {s.times[limit.k + 1]:.1f} s" if limit.k > 1 else ""
         texts.append(f"{name_limit(step, limit)} {motion} (h = {step.h[row]:.2f} m{when})")
     return f"{', '.join(texts)}, and h may shrink by at most {100 * s.gamma:g} % a step"

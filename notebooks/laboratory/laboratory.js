@@ -8,7 +8,7 @@ const GRAB_RADIUS = 16;  // distance within which the pointer takes hold of a th
 const ARROW = 0.5;  // length of the arrow of a person who stands; 1 m longer for each m/s [m]
 const FASTEST = 2.0;  // speed up to which the arrow of a person can be drawn [m/s]
 const LONGEST = 1200;  // time steps after which the laboratory pauses
-const ACTIVE = "#E69F00", SECOND = "#CC79A7", WAY = "#5E3C99";  // colours of the active limit, the second robot, ways
+const SECOND = "#CC79A7", WAY = "#5E3C99";  // colours of the active limit, the second robot, ways
 const SLIDERS = [
   { name: "N", label: "N [steps]", title: "length of the plan", min: 2, max: 24, step: 1 },
   { name: "N_h", label: "N_h [steps]", title: "of these, with barriers", min: 1, max: 24, step: 1 },
@@ -31,17 +31,6 @@ function interpolate(before, now, share) {
   const mix = (a, b) => (a ? b.map((v, i) => (i < 2 ? a[i] + share * (v - a[i]) : v)) : b);
   const mixAll = (a, b) => b.map((each, i) => mix(a[i], each));
   return { ...now, robot: mix(before.robot, now.robot), people: mixAll(before.people, now.people), zones: mixAll(before.zones, now.zones) };
-}
-
-function drawText(context, text, x, y, align = "left", colour = "#333333") {
-  context.font = "11px sans-serif";
-  context.textAlign = align;
-  context.lineWidth = 3;
-  context.strokeStyle = "rgba(255, 255, 255, 0.85)";
-  context.strokeText(text, x, y);
-  context.fillStyle = colour;
-  context.fillText(text, x, y);
-  context.textAlign = "left";
 }
 
 function drawCircle(context, [px, py], radius, colour, width, dash = []) {
@@ -152,52 +141,6 @@ function drawChart(context, width, height, { title, low, high, lines, levels }, 
   rule([[x(now), top], [x(now), bottom]], "#0072B2", 1);
 }
 
-// Draws the admissible accelerations, the active limits with their names, and the chosen acceleration.
-function drawAccelerations(context, size, snapshot, colours) {
-  const a = snapshot.a_max, reach = 1.25 * a, left = 36, bottom = size - 34;
-  const inner = makeView([-reach, reach, -reach, reach], size - left - 4, bottom - 4);
-  context.fillStyle = "white";
-  context.fillRect(0, 0, size, size);
-  context.save();
-  context.translate(left, 4);
-  for (const v of [-a, 0, a]) {
-    drawLine(context, inner, [[-reach, v], [reach, v]], "#dddddd", 1);
-    drawLine(context, inner, [[v, -reach], [v, reach]], "#dddddd", 1);
-  }
-  context.beginPath();
-  context.rect(0, 0, inner.width, inner.height);
-  context.strokeStyle = "#999999";
-  context.stroke();
-  context.clip();
-  for (const ring of snapshot.allowed) {
-    context.beginPath();
-    for (const [x, y] of ring) context.lineTo(...inner.pixel(x, y));
-    context.closePath();
-    context.fillStyle = `${colours.plan}66`;
-    context.fill();
-  }
-  drawLine(context, inner, [[-a, -a], [a, -a], [a, a], [-a, a], [-a, -a]], "#555555", 1, [4, 3]);
-  for (const { curve } of snapshot.active) drawLine(context, inner, curve, ACTIVE, 3.5);
-  drawDiamond(context, inner.pixel(...snapshot.control), 7, colours.robot);
-  snapshot.active.forEach(({ kind, number, curve }, i) => {
-    const inside = curve.filter((point) => Math.max(...point.map(Math.abs)) < a);
-    const [px, py] = inner.pixel(...(i % 2 ? inside.at(-1) : inside[0]) ?? [0, 0]);
-    drawText(context, `${kind} ${number}`, px > inner.width / 2 ? px - 6 : px + 6, Math.max(14, py), px > inner.width / 2 ? "right" : "left", "black");
-  });
-  context.restore();
-  for (const v of [-a, 0, a]) {
-    const [px, py] = inner.pixel(v, v);
-    drawText(context, `${v}`, left + px, bottom + 12, "center");
-    drawText(context, `${v}`, left - 4, py + 8, "right");
-  }
-  drawText(context, "a_x [m/s\u00b2]", left + inner.width / 2, size - 6, "center");
-  context.save();
-  context.translate(10, 4 + inner.height / 2);
-  context.rotate(-Math.PI / 2);
-  drawText(context, "a_y [m/s\u00b2]", 0, 0, "center");
-  context.restore();
-}
-
 // --- the page --------------------------------------------------------------------------------------------
 
 function addButton(parent, name, text, title) {
@@ -238,7 +181,8 @@ function build(el, content) {
   const main = addElement(el, "div", {}, { display: "flex", gap: "14px", flexWrap: "wrap", alignItems: "flex-start" });
   const left = addElement(main, "div", {}, { width: `${WIDTH}px` }), right = addElement(main, "div", {}, { width: "300px", fontSize: "13px" });
   page.title = addElement(left, "div", { className: "szlib-title" }, { fontWeight: "bold", fontSize: "13px" });
-  page.scene = addElement(left, "canvas", { className: "szlib-lab-scene", role: "img", ariaLabel: "the scene" }, { display: "block", touchAction: "none" });
+  page.title.textContent = "Starting: the first picture comes when the kernel has built its controllers \u2026";
+  page.scene = addElement(left, "canvas", { className: "szlib-lab-scene", role: "img", tabIndex: 0, ariaLabel: "the scene; space plays, the arrow keys step" }, { display: "block", touchAction: "none" });
   page.time = addElement(left, "input", { type: "range", min: 0, max: 0, step: 1, className: "szlib-time", ariaLabel: "time" }, { width: "100%" });
   const charts = addElement(left, "div", {}, { display: "flex", gap: "4px" });
   page.h = addElement(charts, "canvas", { role: "img", ariaLabel: "h over time" });
@@ -404,6 +348,12 @@ function render({ model, el }) {
   };
   page.play.onclick = () => setPlaying(!playing);
   page.step.onclick = () => { setPlaying(false); advance(); };
+  page.scene.onkeydown = (event) => {
+    const action = { " ": page.play.onclick, ArrowRight: page.step.onclick, ArrowLeft: () => { setPlaying(false); go(shown - 1); } }[event.key];
+    if (!action || !entry()) return;
+    event.preventDefault();
+    action();
+  };
   page.time.oninput = () => { setPlaying(false); go(Number(page.time.value)); showSettings(); };
   page.add.onclick = () => { selected = entry().speeds.length; changePerson(selected, { position: findRoom() }); };
   page.remove.onclick = () => { changePerson(chosen(), null); selected = null; };

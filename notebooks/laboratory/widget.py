@@ -23,7 +23,10 @@ from .world import CONSTRUCTORS, LIMITS, PRESETS, RobotOptions, World
 _MARGIN = 0.8  # around everything that can be dragged [m]
 _HEIGHT = 2.0  # half of the least height of the scene [m]
 _KINDS = ("show", "step", "share")  # of the requests of the page
-_SCRIPT = Path(__file__).with_name("laboratory.js").read_text(encoding="utf-8")
+_SCRIPT, _ACCELERATIONS = (
+    Path(__file__).with_name(f"{name}.js").read_text(encoding="utf-8")
+    for name in ("laboratory", "accelerations")
+)
 
 
 class Laboratory(anywidget.AnyWidget):
@@ -51,7 +54,7 @@ class Laboratory(anywidget.AnyWidget):
     'Safe, if people keep their velocity.'
     """
 
-    _esm = f"{read_scripts('scene')}\n{_SCRIPT}"
+    _esm = f"{read_scripts('scene')}\n{_ACCELERATIONS}\n{_SCRIPT}"
     content = traitlets.Dict().tag(sync=True)
 
     def __init__(

@@ -103,9 +103,9 @@ plt.show()
 # ## 4.3 A p-value (10 min)
 #
 # `observed` says how rarely people were near each other, and the array `null` what the same number is
-# in many null models, where nobody minds anybody. Large values speak for respect. How likely is a
-# value as large as the observed one, or larger, if nobody minds anybody? The data then is one draw
-# among all the others.
+# in many null models, where people do not react to each other. Large values speak for respect. How
+# likely is a value as large as the observed one, or larger, if people do not react? The data then is
+# one draw among all the others.
 
 
 # %%

@@ -84,6 +84,18 @@ def test_check_with_changed_parameters_is_an_observation(record, capsys):
     ).changed
 
 
+def test_checks_that_assume_the_zone_of_the_plaza_observe_other_data(record):
+    given = {"data": record.cache.data, "results": record.out.parents[1]}
+    other = NotebookRecord("01_test", given, plaza_zone=True)
+    other.check("the robot arrives in 14 s", False, 20)
+    other.check("d = 0 on the zone", False, always=True)
+    assert [c["kind"] for c in other.checks] == ["observation", "check"]
+    own = given | {"data": "synthetic"}
+    plaza = NotebookRecord("01_test", own, plaza_zone=True)
+    plaza.check("the robot arrives in 14 s", False, 20)
+    assert [c["kind"] for c in plaza.checks] == ["check"]
+
+
 def test_method_parameters_change_encounters_and_zone(record, monkeypatch):
     searched, fitted = [], []
     found = pd.DataFrame({"encounter": [0], "distance": [1.0]})

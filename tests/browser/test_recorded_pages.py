@@ -1,0 +1,64 @@
+"""The recorded laboratory in a real browser, from a file: no kernel, no network, wide and narrow screens."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from laboratory import PRESETS, Axis, Recording, RobotOptions, World
+
+import szlib
+
+ZONE = szlib.Ellipse((0.03, 0.0), (0.97, 0.75))
+AXES = [Axis("gamma", "gamma", (0.05, 0.3)), Axis("y", "person at y [m]", (0.0, 0.5))]
+
+
+def make_world(gamma, y):
+    person = szlib.Person((0.0, y), heading=np.pi)
+    scene = replace(PRESETS["passing"], people=(person,))
+    return World(scene, ZONE, [RobotOptions(changes={"gamma": gamma})])
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    file = tmp_path_factory.mktemp("page") / "recorded.html"
+    head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    recording = Recording("Passing", make_world, AXES, longest=6.0)
+    file.write_text(f"<!doctype html>{head}<body>{recording._repr_html_()}", "utf-8")
+    return file
+
+
+@pytest.mark.parametrize("width", [1300, 390])
+def test_a_recording_is_operated_by_keys_sliders_and_touch(browser, file, width):
+    page, faults = browser.new_page(), []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("request", lambda r: r.url.startswith("file:") or faults.append(r.url))
+    page.set_viewport_size({"width": width, "height": 900})
+    page.goto(file.as_uri())
+    page.wait_for_selector(".szlib-recorded-why")
+    status, why = ".szlib-recorded-status", ".szlib-recorded-why"
+    page.focus(".szlib-recorded")
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    assert page.text_content(status).startswith("t = 0.6 s")
+    page.keyboard.press("ArrowLeft")
+    assert page.text_content(status).startswith("t = 0.4 s")
+    page.click(".szlib-recorded-step")
+    assert page.text_content(status).startswith("t = 0.6 s")
+    reasons = set()
+    for value in range(0, 31, 3):
+        page.fill(".szlib-recorded-time", str(value))
+        reasons.add(page.text_content(why))
+    assert len(reasons) > 3
+    before = page.text_content(status)
+    page.fill(".szlib-axis-gamma", "1")
+    assert page.text_content(status) != before
+    label = page.get_attribute(".szlib-recorded-scene", "aria-label")
+    assert label.startswith("Passing: t = ")
+    page.fill(".szlib-recorded-time", "0")
+    page.click(".szlib-recorded-play")
+    page.wait_for_function(
+        f"!document.querySelector('{status}').textContent.startsWith('t = 0.0')"
+    )
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert not faults
+    page.close()
