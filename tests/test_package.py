@@ -42,9 +42,9 @@ PUBLIC = [
     "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",
     "ZoneError", "as_area", "draw_costmap", "ellipse_distance", "encounter_kinds", "extract_days",
-    "find_encounters", "impose_zone", "make_plaza", "minimum_enclosing_ellipse",
-    "null_encounters", "null_test", "of_kind", "pair_correlation", "pool", "read_tracks", "reference_zone",
-    "remove_outliers",
+    "find_encounters", "find_pairs", "impose_zone", "make_plaza", "minimum_enclosing_ellipse",
+    "null_encounters", "null_pairs", "null_test", "of_kind", "pair_correlation", "pool", "read_tracks",
+    "reference_zone", "remove_outliers",
     "rollouts", "segment_distance", "simulate", "time_shifted", "walked_area", "walls_from_map",
 ]  # fmt: skip
 PROMISED = [

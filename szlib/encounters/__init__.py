@@ -13,6 +13,8 @@ one_day          from the files of a day to its encounters
 days             many days, resumable, on one machine or many: `extract_days`
 time_shift       the same people, each moved in time: `time_shifted`
 null_model       encounters of people who do not interact: `null_encounters`
+pairs            every pair of people, and the same streams moved in time: `find_pairs`, `null_pairs`
+sensors          whether tracks end where people are near: `check_sensor`
 """
 
 from .areas import as_area, walked_area
@@ -21,12 +23,15 @@ from .finding import find_encounters
 from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
 from .kinds import KINDS, encounter_kinds, of_kind
 from .null_model import NullEncounters, null_encounters
+from .pairs import find_pairs, null_pairs
 from .samples import SAMPLE_COLUMNS, reference_frame
+from .sensors import SensorCheck
 from .settings import EncounterSettings
 from .time_shift import time_shifted
 
 __all__ = [
     "ATC_SQUARE", "KINDS", "PAPER_SPACE", "SAMPLE_COLUMNS", "Area", "AttentionalSpace", "EncounterSettings",
-    "Extraction", "NullEncounters", "Region", "Square", "as_area", "encounter_kinds", "extract_days",
-    "find_encounters", "null_encounters", "of_kind", "reference_frame", "time_shifted", "walked_area",
+    "Extraction", "NullEncounters", "Region", "SensorCheck", "Square", "as_area", "encounter_kinds",
+    "extract_days", "find_encounters", "find_pairs", "null_encounters", "null_pairs", "of_kind",
+    "reference_frame", "time_shifted", "walked_area",
 ]  # fmt: skip

@@ -21,6 +21,7 @@ from ..core.parallel import run_tasks
 from ..tracks import funnels
 from .finding import find_encounters, find_place
 from .kinds import of_kind
+from .sensors import SensorCheck
 from .settings import EncounterSettings
 from .time_shift import ShiftableTracks
 
@@ -40,7 +41,8 @@ class NullEncounters:
     encounters : every encounter, one row each: shift, encounter, kind, nearest approach [m].
     shifts : number of null models.
     r_max : distance up to which samples are stored [m].
-    parameters : parameters of `null_encounters` that made it (JSON values).
+    parameters : parameters of `null_encounters` or `null_pairs` that made it (JSON values).
+    sensor : what the data says about the sensor; None: not looked at.
 
     Examples
     --------
@@ -57,6 +59,7 @@ class NullEncounters:
     shifts: int
     r_max: float
     parameters: dict[str, Any] = field(default_factory=dict)
+    sensor: SensorCheck | None = None
 
     def one(self, shift: int) -> pd.DataFrame:
         """The samples of one `shift` (its number), to be treated like those of the data."""
@@ -129,10 +132,9 @@ def null_encounters(
     everyone = ShiftableTracks.from_tracks(tracks)
     # an impossible shift raises its error here, not in a worker
     everyone.draw_shifts(seed, minutes)
-    people, companions = (
-        everyone.near(area, settings.duration),
-        len(everyone.companions),
-    )
+    people = everyone.near(area, settings.duration)
+    companions = len(everyone.companions)
+    grouped = len(np.unique(everyone.companions)) / max(len(everyone.day), 1)
     del everyone  # from here on only the rows near the area are needed
     find = partial(_find_shifted, people, seed, minutes, r_max, settings, kinds)
     batches = [
@@ -152,6 +154,7 @@ def null_encounters(
         "seed": seed,
         "minutes": of_all,
         "companions": companions,
+        "grouped": grouped,
     }
     parameters = {**made_by, "kinds": kinds, **settings.as_json()}
     return NullEncounters(*_concatenate(found), shifts, float(r_max), parameters)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pandas as pd
@@ -73,6 +73,10 @@ class TrackRows:
 
     def __len__(self) -> int:
         return len(self.x)
+
+    def select(self, rows: np.ndarray) -> TrackRows:
+        """Some of these `rows` (a mask or indices), with the numbers of their people and pieces."""
+        return TrackRows(*(getattr(self, each.name)[rows] for each in fields(self)))
 
 
 def find_occupants(

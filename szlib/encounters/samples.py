@@ -28,16 +28,30 @@ def sample_windows(
 ) -> pd.DataFrame:
     """The samples of windows of `steps` that open at rows `ref` and `other` of `tracks` in `order`."""
     window = np.arange(steps + 1)
-    of_ref = tracks.iloc[order[(ref[:, None] + window).ravel()]].reset_index(drop=True)
-    of_other = tracks.iloc[order[(other[:, None] + window).ravel()]].reset_index(
-        drop=True
+    samples = sample_rows(
+        tracks,
+        order[(ref[:, None] + window).ravel()],
+        order[(other[:, None] + window).ravel()],
+    )
+    samples.insert(0, "encounter", np.repeat(np.arange(len(ref)), steps + 1))
+    return samples
+
+
+def sample_rows(
+    tracks: pd.DataFrame, ref: np.ndarray, other: np.ndarray
+) -> pd.DataFrame:
+    """Measure two people at rows `ref` and `other` of `tracks`: `SAMPLE_COLUMNS` without the encounter.
+
+    The time is that of the reference pedestrian: in a shifted crowd they differ.
+    """
+    of_ref, of_other = (
+        tracks.iloc[rows].reset_index(drop=True) for rows in (ref, other)
     )
     dx, dy = of_other["x"] - of_ref["x"], of_other["y"] - of_ref["y"]
     bearing = np.arctan2(dy, dx) - np.arctan2(of_ref["vy"], of_ref["vx"])
     from_other = np.arctan2(-dy, -dx) - np.arctan2(of_other["vy"], of_other["vx"])
     return pd.DataFrame(
         {
-            "encounter": np.repeat(np.arange(len(ref)), steps + 1),
             "day": of_ref["day"].astype("category"),
             "ref_id": of_ref["id"],
             "other_id": of_other["id"],

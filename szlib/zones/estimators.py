@@ -70,6 +70,14 @@ class Estimator(ABC):
         """Draw `n` ellipses at `speeds` with `rng` from the posterior, as in `refit`; None: it has none."""
         return None
 
+    def has_converged(self) -> bool:
+        """Whether the draws from the posterior can be relied on."""
+        return True
+
+    def describe_posterior(self) -> str:
+        """How the posterior was drawn from; "" if there is none."""
+        return ""
+
     @abstractmethod
     def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
         """Row numbers of the encounters that determine the zones at `speeds` [m/s] most."""

@@ -45,7 +45,8 @@ from ..encounters.null_model import NullEncounters
 from ..tracks import funnels
 from .estimators import Estimator
 from .polar import DIRECTIONS, PolarZone, ellipse_reach
-from .respect_likelihood import VIEWS, Likelihood, PairPaths, threads, zone_ellipses
+from .respect_likelihood import VIEWS, Likelihood, PairPaths, zone_ellipses
+from .sampling import Draws
 
 # Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
 # a row, for other reasons than respect, which a shift in time removes as well. Who stands has no heading.
@@ -54,6 +55,7 @@ _MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: t
 # encounters drawn from the null model, at least and at most; else two for each
 _NULL_DRAWN = (4000, 8000)
 _NULL_PER_ENCOUNTER = 2  # of the data
+_DATA_DRAWN = 4000  # encounters of the data that are used: with more, people differ from the model by more
 # Encounters of the data within r_max: with fewer the zone reaches as far as nobody was seen.
 MIN_COMPARED = 150
 _MAX_LEFT_OUT = 5
@@ -112,10 +114,16 @@ class RespectEstimator(Estimator):
             reason = "of a kind that is not compared (same direction, companions), or not in the null model"
             close = funnels.select(close, of_kind, "samples: kinds compared", reason)
             against = against[against["kind"].isin(close["kind"].unique())]
+        rng, known = np.random.default_rng(0), close["encounter"].unique()
+        if len(known) > _DATA_DRAWN:
+            some = rng.choice(known, _DATA_DRAWN, replace=False)
+            drawn = close["encounter"].isin(some).to_numpy()
+            reason = f"of more than {_DATA_DRAWN:,} encounters, some at random"
+            close = funnels.select(close, drawn, "samples: drawn", reason)
         known, n = against["encounter"].unique(), close["encounter"].nunique()
         size = int(np.clip(_NULL_PER_ENCOUNTER * n, *_NULL_DRAWN))
         if len(known) > size:
-            drawn = np.random.default_rng(0).choice(known, size, replace=False)
+            drawn = rng.choice(known, size, replace=False)
             against = against[against["encounter"].isin(drawn)]
         if not (n and len(known)):
             raise ZoneError(
@@ -179,12 +187,10 @@ class RespectEstimator(Estimator):
         return best
 
     @cached_property
-    def draws(self) -> Array:
-        """Parameters drawn from the posterior, shape (k, 12)."""
-        with threads().limit(limits=1):
-            return Likelihood.of(self.data, self.null).draw(
-                self.best, np.random.default_rng(0)
-            )
+    def draws(self) -> Draws:
+        """Parameters drawn from the posterior."""
+        likelihood = Likelihood.of(self.data, self.null)
+        return likelihood.draw(self.best, np.random.default_rng(0))
 
     def fit_shape(self, speeds: Sequence[float]) -> PolarZone:
         """Fit the ellipses, and give their radii at `speeds`, ascending [m/s]."""
@@ -205,11 +211,23 @@ class RespectEstimator(Estimator):
         self, n: int, speeds: Sequence[float], rng: np.random.Generator
     ) -> Array:
         """Draw `n` ellipses at `speeds` (s,) [m/s] with `rng` from the posterior, shape (n, s, 5)."""
-        return self.posterior(speeds)[rng.integers(len(self.draws), size=n)]
+        return self.posterior(speeds)[rng.integers(len(self.draws.values), size=n)]
+
+    def has_converged(self) -> bool:
+        """Whether the chains agree and are long enough."""
+        return self.draws.has_converged
+
+    def describe_posterior(self) -> str:
+        """Number of draws, and how well the chains agree."""
+        found = self.draws
+        return (
+            f"{len(found.values)} draws, {found.n_effective:.0f} of them effective, "
+            f"R-hat {found.r_hat:.3f}"
+        )
 
     def posterior(self, speeds: Sequence[float]) -> Array:
         """All ellipses drawn from the posterior at `speeds` (s,) [m/s], shape (k, s, 5)."""
-        ellipses = zone_ellipses(self.draws, speeds)
+        ellipses = zone_ellipses(self.draws.values, speeds)
         mean, spread = ellipses.mean(axis=0), np.maximum(ellipses.std(axis=0), 1e-9)
         return np.asarray(
             mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)

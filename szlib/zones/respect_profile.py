@@ -24,7 +24,7 @@ encounters.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -113,6 +113,15 @@ class Approaches:
             1 + both[1].astype(int),
             null.shifts,
             null.r_max,
+        )
+
+    def select(self, is_kept: NDArray[np.bool_]) -> Approaches:
+        """The encounters that are kept (`is_kept`)."""
+        return replace(
+            self,
+            nearest=self.nearest[is_kept],
+            kind=self.kind[is_kept],
+            shift=self.shift[is_kept],
         )
 
 

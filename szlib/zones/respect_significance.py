@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from ..core.errors import DataError, ZoneError, warn
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
+from ..encounters.sensors import SensorCheck
 from .estimators import Estimator
 from .respect_profile import Approaches, RespectRadius, fit_radius
 
@@ -56,6 +57,9 @@ class NullTest:
     n_encounters : of the data, within r_max.
     respect : the radius of the respect zone of the data, all directions pooled.
     excluded_below : encounters nearer than this were left out [m].
+    sensor : what the data says about the sensor; None: not looked at.
+    p_beyond : p-value of the encounters beyond the distance that the sensor resolves, where it loses people.
+    null_radius : the largest radius that the same fit gives one of some shifts against the others [m].
 
     Examples
     --------
@@ -74,6 +78,9 @@ class NullTest:
     n_encounters: int
     respect: RespectRadius
     excluded_below: float = 0.0
+    sensor: SensorCheck | None = None
+    p_beyond: float | None = None
+    null_radius: float = 0.0
 
     @property
     def n_shifts(self) -> int:
@@ -128,18 +135,41 @@ def null_test(
     """
     _warn_about_kinds(samples, null)
     found = Approaches.of(samples, null, excluded_below=excluded_below)
-    near = found.nearest[:, None] < RADII
-    statistics = _find_deficits(found.shift, near, found.kind, 1 + null.shifts)
+    p_value, statistics = _compare(found)
+    sensor, p_beyond = null.sensor, None
+    if sensor is not None and sensor.loses_people:
+        far = found.select(found.nearest >= sensor.resolved)
+        p_beyond = _compare(far)[0] if (far.shift == 0).any() else 1.0
     return NullTest(
-        p_value=float(
-            (1 + (statistics[1:] >= statistics[0]).sum()) / (1 + null.shifts)
-        ),
+        p_value=p_value,
         statistic=float(statistics[0]),
         null_statistics=tuple(map(float, statistics[1:])),
         n_encounters=int((found.shift == 0).sum()),
         respect=fit_radius(found),
         excluded_below=float(excluded_below),
+        sensor=sensor,
+        p_beyond=p_beyond,
+        null_radius=_fit_null_radius(found),
     )
+
+
+def _compare(found: Approaches) -> tuple[float, NDArray[np.float64]]:
+    """The p-value, and the statistics of the data and of each shift."""
+    near = found.nearest[:, None] < RADII
+    statistics = _find_deficits(found.shift, near, found.kind, 1 + found.n_shifts)
+    p_value = (1 + (statistics[1:] >= statistics[0]).sum()) / (1 + found.n_shifts)
+    return float(p_value), statistics
+
+
+def _fit_null_radius(found: Approaches) -> float:
+    """The largest low end of the radius that some shifts have, each against all others [m]; 0: none."""
+    radii = [0.0]
+    for k in range(1, 1 + min(_NULL_DRAWS, found.n_shifts - 1)):
+        others = found.select(found.shift > 0)
+        as_data = np.where(others.shift == k, 0, np.maximum(others.shift, 1))
+        with suppress(ZoneError):  # no encounter of a kind of the others
+            radii.append(fit_radius(replace(others, shift=as_data)).low)
+    return max(radii)
 
 
 def fit_null_radii(

@@ -340,6 +340,8 @@ class SocialZone:
 
     def missing_data(self, speed: float) -> str:
         """Describe the sides that lack encounters at a `speed` [m/s]; "" if none does."""
+        if self.method == "respect" and self.uncertainty is not None:
+            return ""  # its intervals say what is missing
         if self.side_counts is None:
             return (
                 "the quality of the zone is unknown: encounters were not counted by side (an older file, or "

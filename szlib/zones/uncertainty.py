@@ -73,6 +73,7 @@ class Uncertainty:
     bands : speed [m/s], direction [rad], low, high [m]: distance from the person to the ellipse.
     influence : speed [m/s], encounter (its number), metres: the encounter that moves centre or semi-axes
         most if it is left out, and by how much.
+    has_converged : whether the chains of a posterior agree and are long enough.
     """
 
     level: float
@@ -82,6 +83,7 @@ class Uncertainty:
     intervals: pd.DataFrame
     bands: pd.DataFrame
     influence: pd.DataFrame
+    has_converged: bool = True
 
 
 def count_by_side(
@@ -175,7 +177,7 @@ def estimate_uncertainty(
     factor, resampled = 0.0, estimator.draw_posterior(n_resamples, speeds, rng)
     is_posterior = resampled is not None
     if is_posterior:
-        description = f"posterior: {n_resamples} draws"
+        description = f"posterior: {estimator.describe_posterior()}"
     elif estimator.is_extreme:
         size = max(1, round(SUBSAMPLE * n))
         drawn = (np.argsort(rng.random((n_resamples, n)), axis=1) < size).astype(int)
@@ -205,7 +207,10 @@ def estimate_uncertainty(
         _interval_table(speeds, "direction", DIRECTIONS, bands),
         _influence(estimator, speeds, ellipses[0]),
     )
-    return Uncertainty(LEVEL, int(n_resamples), unit, description, *tables)
+    converged = estimator.has_converged()
+    return Uncertainty(
+        LEVEL, int(n_resamples), unit, description, *tables, has_converged=converged
+    )
 
 
 def _influence(

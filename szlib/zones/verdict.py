@@ -15,11 +15,20 @@ from typing import Any, Self
 import numpy as np
 
 from ..tracks import funnels
-from .uncertainty import MIN_ENCOUNTERS
 
 USABLE, UNDECIDED, NO_RESPECT = "usable", "undecided", "no respect shown"
-# Encounters that a zone needs: on real people, the intervals of fewer hold the truth too rarely (measured).
+# Encounters that a description needs (quantile, hull): on real people the intervals of fewer hold the
+# truth too rarely (measured).
 MIN_TOTAL = 600
+# Largest share of careless people, unless the method states its own: then most people keep the zone.
+MOST_CARELESS = 0.2
+# Largest share of people in groups where the null model moves each person alone (70 % fake respect).
+MOST_GROUPED = 0.1
+# Distance of two people whose bodies touch, shoulder to shoulder or chest to chest [m] (assumed).
+BODY_CONTACT = 0.4
+# Widest interval of a semi-axis, as a share of it.
+WIDEST = 0.6
+SIGNIFICANCE = 0.05
 # Encounters within r_max from which on the test finds a core of 0.8 m in more than 90 % of crowds.
 MIN_TESTED = 60
 
@@ -68,14 +77,19 @@ def judge(zone: FittedZone, speed: float) -> Verdict:
         )
     ]
     reasons += funnels.warnings(zone.provenance.get("funnel", []))
-    reasons += [*_null_model(zone, speed), *_intervals(zone, speed)]
+    reasons += [*_null_model(zone), *_sensor(zone)]
+    reasons += [*_place(zone, speed), *_width(zone, speed)]
     return Verdict(UNDECIDED, reasons) if reasons else Verdict(USABLE, [f"{test}"])
 
 
 def describe_missing_encounters(provenance: Mapping[str, Any]) -> str:
-    """Describe how many encounters, and hours, a zone of this `provenance` lacks; "" if none."""
+    """Describe how many encounters, and hours, a zone of this `provenance` lacks; "" if none.
+
+    The interval of the respect zone itself says whether there were enough: see `_width`.
+    """
     n, hours = provenance.get("encounters"), provenance.get("hours")
-    if not n or n >= MIN_TOTAL:
+    method = provenance.get("parameters", {}).get("method")
+    if not n or n >= MIN_TOTAL or method == "respect":
         return ""
     more = (
         ""
@@ -85,7 +99,7 @@ def describe_missing_encounters(provenance: Mapping[str, Any]) -> str:
     return f"{n} encounters were found, {MIN_TOTAL} are needed{more}"
 
 
-def _null_model(zone: FittedZone, speed: float) -> Iterator[str]:
+def _null_model(zone: FittedZone) -> Iterator[str]:
     """What is missing in the comparison with people who ignore each other."""
     test = zone.null_test
     if test is None:
@@ -93,38 +107,78 @@ def _null_model(zone: FittedZone, speed: float) -> Iterator[str]:
         return
     if not test.is_significant:
         yield f"{test}, and {MIN_TESTED} encounters within {zone.r_max:g} m are needed to tell"
-    q = zone.provenance.get("parameters", {}).get("q")
-    if q is not None and test.respect.careless_high >= q:
+    limit = zone.provenance.get("parameters", {}).get("q", MOST_CARELESS)
+    if test.respect.careless_high >= limit:
         yield (
             f"up to {test.respect.careless_high:.1%} of the encounters may be of careless people who enter "
-            f"the zone; it holds only if these are fewer than q = {q:.1%}"
+            f"the zone; it holds only if these are fewer than q = {limit:.1%}"
         )
-    for fitted in _neighbours(zone, speed):
-        area, null = (
-            _interval(zone, fitted, "area")[0],
-            zone.null_radii.get(fitted, np.nan),
+    grouped = zone.provenance.get("parameters", {}).get("null", {}).get("grouped", 0.0)
+    if grouped > MOST_GROUPED:
+        yield (
+            f"{grouped:.0%} of the people walk with somebody, and the null model moved each alone: groups "
+            "look like respect then; compare every pair, with szlib.find_pairs and szlib.null_pairs"
         )
-        if not np.sqrt(max(area, 0.0) / np.pi) > null:
-            yield (
-                f"at {fitted:g} m/s the same method gives people who ignore each other a zone with a mean "
-                f"radius of {null:.2f} m, and this one is not clearly larger"
-            )
 
 
-def _intervals(zone: FittedZone, speed: float) -> Iterator[str]:
-    """What is wrong with the intervals."""
-    counts = (
-        {}
-        if zone.side_counts is None
-        else zone.side_counts.set_index("speed")["encounters"]
-    )
+def _sensor(zone: FittedZone) -> Iterator[str]:
+    """What the sensor explains: a tracker that loses people who are near each other."""
+    test = zone.null_test
+    if test is None or test.sensor is None or not test.sensor.loses_people:
+        return
+    if test.p_beyond is None or test.p_beyond > SIGNIFICANCE:
+        yield (
+            f"the tracker loses people nearer than {test.sensor.resolved:.1f} m to each other "
+            f"({test.sensor}), and beyond that no respect shows (p = {test.p_beyond:.2g})"
+        )
+
+
+def _place(zone: FittedZone, speed: float) -> Iterator[str]:
+    """Why the zone is not surely larger than what other things than respect explain."""
+    test = zone.null_test
+    resolved = 0.0 if test is None or test.sensor is None else test.sensor.resolved
+    shifted = 0.0 if test is None else test.null_radius
     for fitted in _neighbours(zone, speed):
-        for name in ("a", "b"):
+        low = np.sqrt(max(_interval(zone, fitted, "area")[0], 0.0) / np.pi)
+        null = zone.null_radii.get(fitted, np.nan) if test is not None else 0.0
+        for least, what in (
+            (BODY_CONTACT, "two bodies that touch are so near"),
+            (resolved, "the tracker loses people who are nearer"),
+            (
+                max(null, shifted) if null == null else np.nan,
+                "the same method gives people who ignore each other a zone so large",
+            ),
+        ):
+            if not low > least:
+                yield (
+                    f"at {fitted:g} m/s the mean radius may be as small as {low:.2f} m, which is not clearly "
+                    f"larger than {least:.2f} m: {what}"
+                )
+
+
+def _width(zone: FittedZone, speed: float) -> Iterator[str]:
+    """What is wrong with the intervals: missing, of chains that disagree, or too wide."""
+    if zone.uncertainty is not None and not zone.uncertainty.has_converged:
+        yield f"the chains of the posterior do not agree ({zone.uncertainty.description})"
+    for fitted in _neighbours(zone, speed):
+        for name, value in zip(
+            ("a", "b"), zone.ellipses[fitted].semi_axes, strict=True
+        ):
             low, high = _interval(zone, fitted, name)
             if not (low > 0 and np.isfinite(high)):
                 yield f"at {fitted:g} m/s the interval of the semi-axis {name} cannot be given"
-        if counts.get(fitted, MIN_ENCOUNTERS) < MIN_ENCOUNTERS:
-            yield f"at {fitted:g} m/s the interval rests on fewer than {MIN_ENCOUNTERS} encounters"
+            elif (width := (high - low) / value) > WIDEST:
+                hours = zone.provenance.get("hours")
+                more = (width / WIDEST) ** 2 - 1
+                lacking = (
+                    f"{more * hours:.2g} more hours of recording"
+                    if hours
+                    else f"{1 + more:.2g} times the data"
+                )
+                yield (
+                    f"at {fitted:g} m/s the semi-axis {name} is {low:.2f} to {high:.2f} m, wider than "
+                    f"{WIDEST:.0%} of it: {lacking} would do"
+                )
 
 
 def _interval(zone: FittedZone, speed: float, quantity: str) -> tuple[float, float]:

@@ -18,6 +18,7 @@ from .. import __version__
 from ..core.errors import SzlibError, ZoneError
 from ..core.files import write_file
 from ..core.input_files import read_small, reading
+from ..encounters.sensors import SensorCheck
 from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone
@@ -144,9 +145,13 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     if null_test is not None:
         statistics = tuple(map(float, null_test["null_statistics"]))
         respect = RespectRadius(**null_test["respect"])
-        null_test = NullTest(
-            **{**null_test, "null_statistics": statistics, "respect": respect}
-        )
+        sensor = null_test.get("sensor")
+        null_test |= {
+            "null_statistics": statistics,
+            "respect": respect,
+            "sensor": None if sensor is None else SensorCheck(**sensor),
+        }
+        null_test = NullTest(**null_test)
     return {
         "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
         if content["radii"] is None
@@ -201,7 +206,9 @@ def _to_json(value: Any) -> Any:
     """JSON values of a table, array or group of fields; NaN is null and infinity "Infinity"."""
     if isinstance(value, pd.DataFrame):
         return {name: column.to_numpy() for name, column in value.items()}
-    if isinstance(value, Uncertainty | NullTest | RespectRadius | PolarZone):
+    if isinstance(
+        value, Uncertainty | NullTest | RespectRadius | SensorCheck | PolarZone
+    ):
         return {_KEYS.get(name, name): each for name, each in vars(value).items()}
     if isinstance(value, np.generic):
         return value.item()

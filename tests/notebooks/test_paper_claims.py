@@ -11,7 +11,7 @@ from studies import paper_claims as claims
 from studies.claims import measure_density
 
 import szlib
-from szlib.zones import respect_likelihood
+from szlib.zones import sampling
 from szlib.zones.sensitivity import sensitivity
 
 
@@ -200,8 +200,7 @@ def test_zones_without_people_on_some_side_decide_nothing(plaza: pd.DataFrame) -
 def test_a_shape_is_a_difference_from_the_null_model(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(respect_likelihood, "_STEPS", 600)
-    monkeypatch.setattr(respect_likelihood, "_BURN_IN", 200)
+    monkeypatch.setattr(sampling, "_MOST_BLOCKS", 2)
     crowd, null = passing_pairs(1000, 1), null_of(passing_pairs(2000, 0))
     people = respecting(crowd, szlib.Ellipse((0.0, 0.0), (0.9, 0.7)), careless=0.05)
     ahead, growth = claims.measure_shape(people, null)

@@ -247,31 +247,33 @@ def test_the_posterior_has_the_curvature_of_its_density(
 ) -> None:
     """Of well determined parameters the standard deviation is that of the Gaussian with this curvature."""
     likelihood = Likelihood.of(estimator.data, estimator.null)
-    names, step = [3, 5], 0.02
+    tempered = replace(likelihood, weights=likelihood.power * likelihood.weights)
+    names, step, draws = [3, 5], 0.02, estimator.draws.values
 
     def value(q: np.ndarray) -> float:
-        p = estimator.draws.mean(axis=0)
+        p = draws.mean(axis=0)
         p[names] += q
-        return likelihood.log_posterior(p)
+        return -tempered.cost(p)[0]
 
     grid = np.linspace(-4, 4, 17) * step
     density = np.array([[value(np.array([x, y])) for y in grid] for x in grid])
     weight = np.exp(density - density.max())
     of_b = np.sqrt((weight.sum(axis=0) * grid**2).sum() / weight.sum())
-    drawn = estimator.draws[:, 5].std()
+    drawn = draws[:, 5].std()
     assert 0.8 * of_b < drawn < 2.5 * of_b, "the other parameters widen it"
 
 
 def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> None:
     found = estimate_uncertainty(estimator, [0.9, 1.1], n_resamples=300, seed=0)
-    assert found.description == "posterior: 300 draws"
+    assert found.description.startswith("posterior: ")
+    assert "R-hat 1.0" in found.description and found.has_converged
     at = found.intervals[found.intervals["speed"] == 1.1].set_index("quantity")
     for name, truth in {"a": 0.95, "b": 0.7, "center_x": 0.1, "center_y": 0.0}.items():
         low, high = at.loc[name, ["low", "high"]]
         assert abs(truth - (low + high) / 2) <= 0.75 * (high - low), (
             f"{name}: three standard deviations"
         )
-    of_b = estimator.draws[:, 5]
+    of_b = estimator.draws.values[:, 5]
     assert at.loc["b", "high"] == pytest.approx(
         np.exp(np.quantile(of_b, 0.975)), abs=0.03
     )
@@ -280,12 +282,14 @@ def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> No
 def test_the_posterior_is_never_surer_than_the_model_is_right(
     estimator: RespectEstimator,
 ) -> None:
-    middle = estimator.draws.mean(axis=0)
+    draws = estimator.draws
+    middle = draws.values.mean(axis=0)
     for scale in (0.01, 1.0):
         sure = replace(estimator)
-        sure.__dict__["draws"] = middle + scale * (estimator.draws - middle)
+        near = middle + scale * (draws.values - middle)
+        sure.__dict__["draws"] = replace(draws, values=near)
         raw, found = (
-            respect_likelihood.zone_ellipses(sure.draws, [1.1])[:, 0, :4],
+            respect_likelihood.zone_ellipses(near, [1.1])[:, 0, :4],
             sure.posterior([1.1]),
         )
         assert found[:, 0, :4].mean(axis=0) == pytest.approx(raw.mean(axis=0))

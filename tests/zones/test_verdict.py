@@ -130,7 +130,7 @@ def test_careless_share_above_q_is_noticed() -> None:
         ({"uncertainty": None}, "the interval of the semi-axis a cannot be given"),
         (
             {"null_radii": {SPEED: 1.5}},
-            "a zone with a mean radius of 1.50 m, and this one is not clearly",
+            "larger than 1.50 m: the same method gives people who ignore each other a zone so large",
         ),
         ({"null_radii": {SPEED: np.nan}}, "not clearly larger"),
         ({"side_counts": None}, "encounters were not counted by side"),
