@@ -113,10 +113,9 @@ def _null_model(zone: FittedZone) -> Iterator[str]:
             f"up to {test.respect.careless_high:.1%} of the encounters may be of careless people who enter "
             f"the zone; it holds only if these are fewer than q = {limit:.1%}"
         )
-    grouped = zone.provenance.get("parameters", {}).get("null", {}).get("grouped", 0.0)
-    if grouped > MOST_GROUPED:
+    if test.grouped > MOST_GROUPED:
         yield (
-            f"{grouped:.0%} of the people walk with somebody, and the null model moved each alone: groups "
+            f"{test.grouped:.0%} of the people walk with somebody, and the null model moved each alone: groups "
             "look like respect then; compare every pair, with szlib.find_pairs and szlib.null_pairs"
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -142,6 +143,54 @@ def test_every_condition_is_needed(
     verdict = replace(careful, **change).verdict(SPEED)
     assert verdict == "undecided"
     assert any(reason in each for each in verdict.reasons)
+
+
+def test_a_tracker_that_loses_people_is_undecided(careful: szlib.SocialZone) -> None:
+    """Unless respect shows beyond the distance that it resolves, and the zone reaches farther than that."""
+    sensor = szlib.encounters.SensorCheck(50, 9000, 0.6, 0.45, 0.73, 0.01, 0.6)
+    for p_beyond, expected in ((0.4, "undecided"), (0.01, "usable")):
+        test = replace(careful.null_test, sensor=sensor, p_beyond=p_beyond)
+        assert replace(careful, null_test=test).verdict(SPEED) == expected
+    test = replace(
+        careful.null_test, sensor=replace(sensor, resolved=1.0), p_beyond=0.01
+    )
+    verdict = replace(careful, null_test=test).verdict(SPEED)
+    assert "the tracker loses people who are nearer" in verdict.sentence
+
+
+def test_groups_that_were_moved_one_by_one_are_undecided(
+    careful: szlib.SocialZone,
+) -> None:
+    test = replace(careful.null_test, grouped=0.7)
+    verdict = replace(careful, null_test=test).verdict(SPEED)
+    assert verdict == "undecided"
+    assert "compare every pair, with szlib.find_pairs" in verdict.sentence
+
+
+@pytest.mark.parametrize(
+    ("quantity", "low", "high", "reason"),
+    [
+        ("area", 0.3, 2.5, "two bodies that touch are so near"),
+        ("a", 0.3, 1.6, "times the data would do|more hours of recording would do"),
+    ],
+)
+def test_intervals_in_the_wrong_place_or_too_wide_are_undecided(
+    careful: szlib.SocialZone, quantity: str, low: float, high: float, reason: str
+) -> None:
+    known = careful.uncertainty
+    rows = known.intervals.copy()
+    rows.loc[rows["quantity"] == quantity, ["low", "high"]] = low, high
+    verdict = replace(careful, uncertainty=replace(known, intervals=rows)).verdict(
+        SPEED
+    )
+    assert verdict == "undecided"
+    assert re.search(reason, verdict.sentence)
+
+
+def test_chains_that_do_not_agree_are_undecided(careful: szlib.SocialZone) -> None:
+    apart = replace(careful.uncertainty, has_converged=False)
+    verdict = replace(careful, uncertainty=apart).verdict(SPEED)
+    assert "the chains of the posterior do not agree" in verdict.sentence
 
 
 def test_implausible_data_are_undecided(careful: szlib.SocialZone) -> None:
