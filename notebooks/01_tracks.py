@@ -42,7 +42,7 @@
 # Parameters of this notebook
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
-reading = {}  # options of szlib.ReadOptions, such as {"unit": "mm", "columns": {"t": "Zeit"}}
+reading = {}  # options of szlib.Recipe, such as {"unit": "mm", "columns": {"t": "Zeit"}}
 seed = 0
 results = "../results"
 
@@ -76,7 +76,7 @@ parameters(
 # %% jupyter={"source_hidden": true}
 # Figure
 files, options = record.cache.files(), record.cache.method.read_options()
-raw = readers.read_raw(files, options=options)
+raw = readers.read_raw(files, recipe=options)
 people = clock.to_clock(raw, max_gap=options.max_gap)
 if people["day"].nunique() > 1:
     people = record.cache.tracks()  # recordings of several places stand side by side

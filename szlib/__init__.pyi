@@ -64,7 +64,7 @@ from .simulation import (
     rollouts,
     simulate,
 )
-from .tracks import ReadOptions, read_tracks
+from .tracks import Recipe, read_tracks
 from .zones import (
     Ellipse,
     Grid,
@@ -106,7 +106,7 @@ __all__ = [
     "Person",
     "PlazaSettings",
     "Pooled",
-    "ReadOptions",
+    "Recipe",
     "ReferenceZone",
     "Region",
     "RespectRadius",

@@ -36,7 +36,7 @@ DRAWN = {
 
 PUBLIC = [
     "ATC_SQUARE", "AttentionalSpace", "DataError", "DataWarning", "DifferentialDrive", "Ellipse",
-    "EncounterSettings", "ReadOptions",
+    "EncounterSettings", "Recipe",
     "Extraction", "Grid", "MEETINGS", "MPCCBF", "MPCSettings", "NullEncounters", "NullTest",
     "PairCorrelation", "Person", "PlazaSettings", "Pooled", "ReferenceZone", "Region",
     "SCENARIOS",

@@ -60,8 +60,7 @@ import szlib
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels, quality
-from szlib.tracks.formats import find_format
-from szlib.tracks.formats.base import CALENDAR_BEGINS
+from szlib.tracks.readers import CALENDAR_BEGINS, find_format
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters, read_table
 
@@ -88,7 +87,7 @@ if record.cache.is_synthetic:  # three more days; on the last one most people st
         plaza = PlazaSettings(n_encounters=encounters, standing=standing, date=date)
         files.append(make_plaza(file, seed=seed + day + 1, settings=plaza))
 seconds = pd.concat([quality.summarise_seconds(file, options).assign(file=file.name) for file in files])
-zone = options.tz or find_format(files[0], options).tz  # of the clock: that of the mall, or UTC
+zone = options.tz or find_format(files[0], options).tz or "UTC"  # of the clock: that of the mall, or UTC
 both = seconds.dropna(subset=["sensor_speed", "moved"])
 if len(both):
     fig, ax = plt.subplots(figsize=(8, 3.6), layout="constrained")
@@ -248,7 +247,7 @@ record.figure(figure, "hours")
 # %%
 by_recording = not has_dates and len(files) > 1 and area in ("", "auto")  # each has its own area
 conditions = record.cache.method.encounter_settings("auto" if by_recording else record.cache.find_area())
-reading = {"settings": conditions, "options": options, "progress": False}
+reading = {"settings": conditions, "recipe": options, "progress": False}
 extraction = szlib.extract_days(files, out=record.out / "days", exclude=exclude, **reading)
 samples = extraction.samples()
 

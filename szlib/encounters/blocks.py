@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import polars as pl
 
-from ..tracks.formats import TrackFormat
 from ..tracks.readers import reject_rows
 
-NUMBERS = ("t", "id", "x", "y")  # columns of a block, in the units of the file
+NUMBERS = ("t", "id", "x", "y")  # columns of a block: t [s], id, x, y [m]
 _BLOCK_ROWS = 1 << 17  # of one block [about 5 minutes of a raw day]
 
 
@@ -23,17 +21,13 @@ class UsableBlocks:
     Attributes
     ----------
     scan : scan of the file.
-    layout : its format.
-    plain : the unpacked file, for messages.
     n_usable : number of usable rows so far.
-    farthest : their largest absolute coordinate [unit of the file].
+    farthest : their largest absolute coordinate [m].
     reasons : number of the other rows by reason.
     first_fault : line and reason of the first of them.
     """
 
     scan: pl.LazyFrame
-    layout: TrackFormat
-    plain: Path | None = None
     n_usable: int = 0
     farthest: float = 0.0
     reasons: Counter[str] = field(default_factory=Counter)
@@ -46,7 +40,7 @@ class UsableBlocks:
             chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"
         ):
             lines = block.with_row_index("line", offset=read + 1)
-            good, reasons, first = reject_rows(lines, self.layout, self.plain)
+            good, reasons, first = reject_rows(lines)
             read += block.height
             self.reasons.update(reasons)
             self.first_fault = self.first_fault or first

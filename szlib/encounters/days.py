@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +28,9 @@ from ..core.files import claim_folder, folder_purpose
 from ..core.input_files import printable, read_json_object, unchanged_files
 from ..core.parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.options import ReadOptions
-from ..tracks.recordings import find_day, name_recordings
+from ..tracks.readers import find_day
+from ..tracks.recipe import Recipe, find_recipe
+from ..tracks.recordings import name_recordings
 from .areas import has_calendar
 from .geometry import Area
 from .one_day import (
@@ -61,7 +62,7 @@ class Extraction:
     sources : what the result of each finished day is made of: content, parameters and version.
     area : where encounters were searched, the same in every day; None where each recording has its own, or
         no day has one.
-    settings, options : what counted as an encounter, and how the files were read.
+    settings, recipe : what counted as an encounter, and how the files were read.
 
     Examples
     --------
@@ -79,7 +80,7 @@ class Extraction:
     sources: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     area: Area | None = None
     settings: EncounterSettings = field(default_factory=EncounterSettings)
-    options: ReadOptions = field(default_factory=ReadOptions)
+    recipe: Recipe = field(default_factory=Recipe)
 
     @classmethod
     def load(cls, out: str | Path, *, exclude: Iterable[str] = ()) -> Extraction:
@@ -119,9 +120,9 @@ class Extraction:
                 "extract all days again, or exclude it"
             )
         table = pd.DataFrame({"day": list(sources), "status": "kept"})
-        settings, options = read_parameters(sources[first]["parameters"])
+        settings, recipe = read_parameters(sources[first]["parameters"])
         area = settings.area if isinstance(settings.area, Area) else None
-        return cls(folder, table, tuple(excluded), sources, area, settings, options)
+        return cls(folder, table, tuple(excluded), sources, area, settings, recipe)
 
     @property
     def failed(self) -> pd.DataFrame:
@@ -187,7 +188,7 @@ def extract_days(
     *,
     out: str | Path,
     settings: EncounterSettings | None = None,
-    options: ReadOptions | None = None,
+    recipe: Recipe | None = None,
     n_jobs: int = 1,
     exclude: Iterable[str] = (),
     progress: bool = True,
@@ -204,11 +205,11 @@ def extract_days(
     settings : what counts as an encounter; None takes the paper's.  With area None the files of the ATC mall
         have `ATC_SQUARE`; others have "auto": the `szlib.walked_area` of the first day, the
         same for all days of a calendar; recordings without a calendar have each their own.
-    options : how files are read.
+    recipe : how files are read.
     n_jobs : number of processes; -1 takes all cores, or all workers of ``joblib.parallel_config("dask")``.
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
-    parameters : single values in place of those of `settings` and `options`, such as area or unit.
+    parameters : single values in place of those of `settings` and `recipe`, such as area or unit.
 
     Returns
     -------
@@ -227,11 +228,7 @@ def extract_days(
     >>> days.samples()["encounter"].nunique() > 0
     True
     """
-    read_names = {each.name for each in fields(ReadOptions)}
-    options = replace(
-        options or ReadOptions(),
-        **{k: v for k, v in parameters.items() if k in read_names},
-    )
+    read_names = {each.name for each in fields(Recipe)} - {"area"}
     others = {
         name: value for name, value in parameters.items() if name not in read_names
     }
@@ -241,8 +238,10 @@ def extract_days(
         (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
     )
     files = sorted({file.resolve() for file in datasets.find(paths)})
+    reading = {k: v for k, v in parameters.items() if k in read_names}
+    recipe = find_recipe(files, recipe, **reading)
     claim_folder(folder, PURPOSE, inputs=files)
-    days = _group_by_day(files, options)
+    days = _group_by_day(files, recipe)
     included = [
         (day, of_day) for day, of_day in sorted(days.items()) if day not in excluded
     ]
@@ -252,7 +251,7 @@ def extract_days(
         with suppress(
             SzlibError
         ):  # the first day with an area; computing a day that fails says why
-            settings, contents[day] = find_area(of_day, settings, options)
+            settings, contents[day] = find_area(of_day, settings, recipe)
             break
     rows = [
         _row(day, of_day, status="excluded")
@@ -265,7 +264,7 @@ def extract_days(
             of_day,
             str(folder.resolve()),
             settings if (day, of_day) in shared else given,
-            options,
+            recipe,
             contents.get(day),
         )
         for day, of_day in included
@@ -280,16 +279,14 @@ def extract_days(
     is_one = shared == included or given.area == settings.area
     settings = settings if is_one else given
     area = settings.area if isinstance(settings.area, Area) else None
-    return Extraction(folder, table, excluded, sources, area, settings, options)
+    return Extraction(folder, table, excluded, sources, area, settings, recipe)
 
 
-def _group_by_day(files: Sequence[Path], options: ReadOptions) -> dict[str, list[str]]:
+def _group_by_day(files: Sequence[Path], recipe: Recipe) -> dict[str, list[str]]:
     """The files of each day, or of each recording that has no calendar day."""
     days: dict[str, list[str]] = {}
     for file, name in zip(files, name_recordings(files), strict=True):
-        days.setdefault(find_day(file, options) or printable(name), []).append(
-            str(file)
-        )
+        days.setdefault(find_day(file, recipe) or printable(name), []).append(str(file))
     return days
 
 
@@ -298,12 +295,12 @@ def extract_day(
     files: Sequence[str],
     out: str,
     settings: EncounterSettings,
-    options: ReadOptions,
+    recipe: Recipe,
     contents: list[Any] | None = None,
 ) -> dict[str, Any]:
     """Compute one `day` from its `files`, or load it from the folder `out`; return its row of the table.
 
-    `settings` and `options` as in `extract_days`.  The files must begin on this day, and have the `contents`
+    `settings` and `recipe` as in `extract_days`.  The files must begin on this day, and have the `contents`
     in which the area was found, if they are given.  Days share nothing but `out`.
     """
     start = time.perf_counter()
@@ -316,7 +313,7 @@ def extract_day(
         # Checksums are computed while the files are read.
         with unchanged_files(paths), ThreadPoolExecutor(1) as thread:
             source = thread.submit(
-                copy_context().run, describe_source, files, settings, options
+                copy_context().run, describe_source, files, settings, recipe
             )
             is_stored, status = (folder / f"{day}.parquet").is_file(), "kept"
             samples = load_day(folder, day, source.result()) if is_stored else None
@@ -324,8 +321,8 @@ def extract_day(
                 status = "done"
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
-                    samples = find_encounters_in_files(paths, settings, options)
-            begins = {find_day(path, options) or day for path in paths}
+                    samples = find_encounters_in_files(paths, settings, recipe)
+            begins = {find_day(path, recipe) or day for path in paths}
         if begins != {day} or contents not in (None, source.result()["files"]):
             raise DataError(
                 f"{paths[0]}: changed after its day or the area was found; extract the day again"

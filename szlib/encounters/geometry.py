@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..core.checks import require
 from ..core.errors import DataError
-from ..tracks.formats.atc import ATC_AREA
+from ..tracks.shapes import ATC_AREA
 
 
 @dataclass(frozen=True)

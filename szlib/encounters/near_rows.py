@@ -17,10 +17,17 @@ import polars as pl
 from ..core import memory
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
-from ..tracks.formats import TrackFormat, find_format, open_file
-from ..tracks.options import ReadOptions
 from ..tracks.plausibility import check_unit
-from ..tracks.readers import merge, order_by_person, read_raw, read_stage
+from ..tracks.readers import (
+    is_streamed,
+    merge,
+    open_file,
+    order_by_person,
+    read_raw,
+    read_stage,
+    with_days,
+)
+from ..tracks.recipe import Recipe, find_recipe
 from ..tracks.recordings import LoadedFile
 from .blocks import UsableBlocks
 from .cells import Cells, UnsortedError, select_near
@@ -71,7 +78,7 @@ def read_near_area(
     *,
     area: Area | None,
     duration: float,
-    options: ReadOptions | None = None,
+    recipe: Recipe | None = None,
 ) -> pd.DataFrame:
     """Read the rows of files that encounters in an area can depend on, as `tracks.readers.read_raw` does.
 
@@ -81,7 +88,7 @@ def read_near_area(
     ----------
     paths : one file, or several of one day.
     area, duration : as in `szlib.EncounterSettings`; area None reads all rows.
-    options : how the files are read.
+    recipe : how the files are read.
 
     Returns
     -------
@@ -91,19 +98,17 @@ def read_near_area(
     ------
     DataError : as `szlib.read_tracks`.
     """
-    options = options or ReadOptions()
     files = [Path(paths)] if isinstance(paths, str | Path) else list(paths)
-    path = files[0]
+    path, recipe = files[0], find_recipe(files, recipe)
     if (
         area is not None
         and len(files) == 1
         and path.is_file()
-        and find_format(path, options).is_streamed
+        and is_streamed(path, recipe)
     ):
-        with open_file(path, options) as (layout, scan, plain), suppress(UnsortedError):
-            max_gap = options.max_gap or layout.max_gap or 0.0
-            cells = Cells(area.grown(REACH).box, duration, max_gap, layout.metres)
-            blocks, parts, n_near = UsableBlocks(scan, layout, plain), [], 0
+        with open_file(path, recipe) as (found, scan), suppress(UnsortedError):
+            cells = Cells(area.grown(REACH).box, duration, found.max_gap or 0.0, 1.0)
+            blocks, parts, n_near = UsableBlocks(scan), [], 0
             for rows in select_near(cells, blocks):
                 parts.append(rows)
                 n_near += rows.height
@@ -113,28 +118,24 @@ def read_near_area(
                 )
             near = pl.concat(parts, rechunk=True)
             near = near[order_by_person(near["id"].to_numpy())]
-            return _as_table(near, blocks, path, layout, options)
-    return read_raw(files, options=options)
+            return _as_table(near, blocks, path, found, is_unit_given=recipe.has_places)
+    return read_raw(files, recipe=recipe)
 
 
 def _as_table(
     near: pl.DataFrame,
     blocks: UsableBlocks,
     path: Path,
-    layout: TrackFormat,
-    options: ReadOptions,
+    recipe: Recipe,
+    *,
+    is_unit_given: bool,
 ) -> pd.DataFrame:
     """The rows as a table as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(
-        path,
-        layout,
-        blocks.n_usable,
-        dict(blocks.reasons),
-        blocks.first_fault,
-        max_rejected=options.max_rejected,
+        path, recipe, blocks.n_usable, dict(blocks.reasons), blocks.first_fault
     )
-    if options.metres is None:
-        check_unit(pl.DataFrame({"x": [blocks.farthest], "y": [0.0]}), layout, path)
+    if not is_unit_given:
+        check_unit(pl.DataFrame({"x": [blocks.farthest], "y": [0.0]}), recipe, path)
     far = {"never near the area": blocks.n_usable - near.height}
     stages = [stage, funnels.stage("near the area", blocks.n_usable, near.height, far)]
     if near.height == 0:
@@ -142,5 +143,5 @@ def _as_table(
         return funnels.attach(
             pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages
         )
-    rows = layout.to_metres(near, path, options.tz)
-    return merge([LoadedFile(path, rows, stages, layout)], copy=False)
+    rows = with_days(near, path, recipe)
+    return merge([LoadedFile(path, rows, stages, recipe)], copy=False)

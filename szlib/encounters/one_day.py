@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,8 @@ from ..core.files import load_cached, store_cached
 from ..core.input_files import file_content, unchanged_files
 from ..tracks import funnels
 from ..tracks.clock import read_tracks, to_clock
-from ..tracks.formats import find_format
-from ..tracks.options import ReadOptions
+from ..tracks.readers import find_format
+from ..tracks.recipe import Recipe
 from .areas import AUTO, area_for, as_area, place_apart
 from .finding import find_encounters
 from .geometry import Area, AttentionalSpace, Region, Square
@@ -42,23 +42,23 @@ _ADVICE = {
     "somebody else": "more data, or other conditions (szlib.find_encounters)",
 }
 # of the cached result of a day; a result of another version is computed again
-_VERSION = 8
+_VERSION = 9
 
 
 def find_encounters_in_files(
-    files: Sequence[Path], settings: EncounterSettings, options: ReadOptions
+    files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
 ) -> pd.DataFrame:
     """Find the encounters of the `files` of one day: the same as in ``szlib.read_tracks(files)``.
 
-    `settings` say what counts as an encounter, `options` how the files are read.  Raises DataError also where
+    `settings` say what counts as an encounter, `recipe` how the files are read.  Raises DataError also where
     a file changes meanwhile.
     """
     with unchanged_files(files):
-        area = known_area(settings, files, options)
+        area = known_area(settings, files, recipe)
         raw = read_near_area(
-            files, area=area, duration=settings.duration, options=options
+            files, area=area, duration=settings.duration, recipe=recipe
         )
-    tracks = to_clock(raw, max_gap=options.max_gap) if len(raw) else raw
+    tracks = to_clock(raw, max_gap=recipe.max_gap) if len(raw) else raw
     if len(tracks) == 0:
         return funnels.attach(no_samples(), funnels.get(tracks))
     return find_encounters(tracks, settings=replace(settings, area=area or AUTO))
@@ -67,51 +67,48 @@ def find_encounters_in_files(
 def with_area(
     settings: EncounterSettings,
     files: Sequence[Path],
-    options: ReadOptions,
+    recipe: Recipe,
     tracks: pd.DataFrame | None = None,
 ) -> EncounterSettings:
     """The `settings` with the area of these `files` where it is "auto" or None.
 
-    The files are read as `options` say, unless their `tracks` are given.
+    The files are read as `recipe` say, unless their `tracks` are given.
     """
-    area = known_area(settings, files, options)
+    area = known_area(settings, files, recipe)
     if area is None:
         if tracks is None:
             # Reading the day itself warns of rejected rows.
             with warnings.catch_warnings(action="ignore", category=DataWarning):
-                tracks = read_tracks(files, options=options)
+                tracks = read_tracks(files, recipe=recipe)
         area = area_for(place_apart(tracks), AUTO, settings.space)
     return replace(settings, area=area)
 
 
 def find_area(
-    files: Sequence[str], settings: EncounterSettings, options: ReadOptions
+    files: Sequence[str], settings: EncounterSettings, recipe: Recipe
 ) -> tuple[EncounterSettings, list[Any] | None]:
     """The `settings` with the area of `files`, and the contents of these if it was found in them.
 
-    The files are read as `options` say; for their contents see `describe_source`.
+    The files are read as `recipe` say; for their contents see `describe_source`.
     """
     paths = [Path(file) for file in files]
     with unchanged_files(paths):
-        is_known = known_area(settings, paths, options) is not None
+        is_known = known_area(settings, paths, recipe) is not None
         contents = (
-            None if is_known else describe_source(files, settings, options)["files"]
+            None if is_known else describe_source(files, settings, recipe)["files"]
         )
-        return with_area(settings, paths, options), contents
+        return with_area(settings, paths, recipe), contents
 
 
 def known_area(
-    settings: EncounterSettings, files: Sequence[Path], options: ReadOptions
+    settings: EncounterSettings, files: Sequence[Path], recipe: Recipe
 ) -> Area | None:
-    """The area of the `settings`, or that of the ATC mall; None where it must be found.
-
-    The mall's `files` are recognised as `options` say.
-    """
+    """The area of the `settings`, of the `recipe`, or of the mall's `files`; None where it must be found."""
     if isinstance(settings.area, Square | Region):
         return settings.area
-    areas = {find_format(file, options).area for file in files}
+    areas = {find_format(file, recipe).area for file in files}
     known = areas.pop() if settings.area is None and len(areas) == 1 else None
-    return Square(*known) if known else None
+    return as_area(known) if known and known != AUTO else None
 
 
 def relax_conditions(
@@ -187,14 +184,14 @@ def require_encounters(samples: pd.DataFrame, advice: str = "") -> pd.DataFrame:
 
 
 def describe_source(
-    files: Sequence[str], settings: EncounterSettings, options: ReadOptions
+    files: Sequence[str], settings: EncounterSettings, recipe: Recipe
 ) -> dict[str, Any]:
     """What the encounters of a day are made of, in JSON values.
 
-    It holds names, sizes and checksums of the `files`, `settings`, `options`, and the version of szlib.
+    It holds names, sizes and checksums of the `files`, `settings`, `recipe`, and the version of szlib.
     """
     content = sorted([Path(file).name, *file_content(Path(file))] for file in files)
-    parameters = settings.as_json() | asdict(options)
+    parameters = settings.as_json() | {"recipe": recipe.as_json()}
     return {
         "version": _VERSION,
         "szlib": __version__,
@@ -205,14 +202,12 @@ def describe_source(
 
 def read_parameters(
     parameters: Mapping[str, Any],
-) -> tuple[EncounterSettings, ReadOptions]:
-    """Settings and options from the `parameters` of `describe_source`; a missing one has its default."""
+) -> tuple[EncounterSettings, Recipe]:
+    """Settings and recipe from the `parameters` of `describe_source`; a missing one has its default."""
     values = {**parameters, "space": AttentionalSpace(**parameters["space"])}
-    settings, options = (
-        {each.name: values[each.name] for each in fields(kind) if each.name in values}
-        for kind in (EncounterSettings, ReadOptions)
-    )
-    return EncounterSettings(**settings), ReadOptions(**options)
+    known = {each.name for each in fields(EncounterSettings)} & values.keys()
+    settings = EncounterSettings(**{name: values[name] for name in known})
+    return settings, Recipe(**values.get("recipe", {}))
 
 
 def store_day(

@@ -1,8 +1,12 @@
 """Where people were, and when: files of any format become one table of tracks on one clock.
 
 funnels       how many rows entered each stage, and why others were rejected
-options       how files are read: `ReadOptions`
-formats       the formats of files and tables: recognition and scans
+recipe        how files are read: `Recipe`
+shapes        the shapes of files that have a name, each with its recipe
+sources       files and tables as columns: text, Parquet, Feather, SQLite, JSON, those of libraries
+columns       which column holds what
+rows          from columns to rows in seconds and metres
+ewap          the frame rate of EWAP files, estimated from their velocities
 plausibility  whether people can move as they do in a table; if not, what was misread
 recordings    which files are pieces of one recording
 readers       rows of files as they are: `read_raw`
@@ -16,7 +20,6 @@ datasets      named data and paths, downloads verified by hash
 from . import datasets, funnels
 from .clock import clock_index, read_tracks, to_clock
 from .interop import check_tracks, read_groups, to_pedpy
-from .options import ReadOptions
 from .quality import (
     count_visits_by_hour,
     measure_frame_intervals,
@@ -24,4 +27,5 @@ from .quality import (
     summarise_seconds,
 )
 from .readers import read_raw
+from .recipe import Recipe
 from .sites import read_edinburgh, read_grand_central, read_magni, read_magni_groups

@@ -15,7 +15,7 @@ one step of the clock, the person was not seen in between; positions are not int
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,9 @@ from ..core import memory
 from ..core.checks import check_columns, check_rows, require
 from ..core.errors import DataError
 from . import funnels
-from .options import SHORTEST_GAP, ReadOptions
 from .readers import is_sorted, read_raw
+from .recipe import SHORTEST_GAP, Recipe, find_recipe
+from .sources import is_table
 
 TICKS_PER_SECOND = 10  # the common clock: positions at multiples of 0.1 s
 
@@ -44,6 +45,9 @@ _LAST_SECOND = 1e11  # latest time [s]; up to here ticks are exact
 # rows brought to the clock at a time; their arrays fit into the processor's cache
 _ROWS_AT_ONCE = 1 << 17
 
+# More samples than this share, and than a few, without a tick mean that times or ids were misread (assumed).
+_MOST_LOST, _FEW = 0.5, 20
+
 _BYTES_PER_TICK = 160  # memory of a tick while a table is brought to the clock [bytes] (measured: 147 to 153)
 
 COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
@@ -52,7 +56,7 @@ COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
 def read_tracks(
     paths: Any,
     *,
-    options: ReadOptions | None = None,
+    recipe: Recipe | None = None,
     exclude: Iterable[str] = (),
     **parameters: Any,
 ) -> pd.DataFrame:
@@ -64,15 +68,16 @@ def read_tracks(
         EWAP obsmat, UCY's vsp, TrajNet++, THOR-MAGNI, Pathfinder's JSON; by PedPy's loaders texts and HDF5 of
         Juelich's archive, Viswalk, Vadere, JuPedSim (extra `pedpy`).  Or tables: of pandas, Polars, Arrow,
         GeoPandas, MovingPandas, PedPy's TrajectoryData.
-    options : how files are read; None takes the defaults.
+    recipe : how files are read; None takes the `reading.json` beside the first file, or finds one.
     exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
-    parameters : single values in place of those of `options`: file_format, unit, scale, frame_rate, columns,
-        max_gap, tz, max_rejected, each as in `szlib.ReadOptions`; None leaves that of `options`.
+    parameters : single values of `szlib.Recipe` in place of those of `recipe`, such as unit, frame_rate or
+        columns; None leaves its own.
 
     Returns
     -------
     The track table; its funnel is in ``.attrs["funnel"]``, and a DataWarning counts the rejected rows.
-    ``.attrs["area"]`` is the area of files of the ATC mall; other files have none.
+    ``.attrs["area"]`` is the area of the recipe, or of files of the ATC mall; ``.attrs["recipe"]`` says how
+    the first file was read.
 
     Raises
     ------
@@ -87,10 +92,12 @@ def read_tracks(
     >>> list(tracks.columns), len(tracks)
     (['day', 'id', 't', 'x', 'y', 'vx', 'vy'], 41)
     """
-    given = {name: value for name, value in parameters.items() if value is not None}
-    options = replace(options or ReadOptions(), **given)
+    sources = (
+        [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
+    )
+    recipe = find_recipe(sources, recipe, **parameters)
     return _interpolate(
-        read_raw(paths, options=options, exclude=exclude), options.max_gap
+        read_raw(sources, recipe=recipe, exclude=exclude), recipe.max_gap
     )
 
 
@@ -100,7 +107,7 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
     Parameters
     ----------
     raw : a table of day, id, t [s], x, y [m], in any order.
-    max_gap : a longer gap between two samples ends a piece [s]; as in `szlib.ReadOptions`.
+    max_gap : a longer gap between two samples ends a piece [s]; as in `szlib.Recipe`.
 
     Returns
     -------
@@ -155,12 +162,17 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     table = pd.DataFrame(
         {"day": day, "id": raw["id"].to_numpy()[row], **columns}, copy=False
     )
+    if len(t) - covered > _MOST_LOST * len(t) + _FEW:
+        raise DataError(
+            f"{len(t) - covered:,} of {len(t):,} samples lie in pieces shorter than a step of 0.1 s: "
+            "are times seconds, and ids people?  Else pass time_unit or frame_rate, or a longer max_gap"
+        )
     rejected = {"in a gap-free piece that covers no tick": len(t) - covered}
     stages = [
         *funnels.get(raw),
         funnels.stage("clock: samples", len(t), covered, rejected),
     ]
-    table.attrs |= {k: raw.attrs[k] for k in ("area",) if k in raw.attrs}
+    table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
     return funnels.attach(table, stages)
 
 

@@ -15,6 +15,7 @@ FASTEST = (3.0, 6.0)
 _FAST_WALK = 4.0
 _SLOWEST = 0.6  # smallest 90 % quantile of the speed of people [m/s]; less is usual only where they stand
 _LONGEST_STEP = 5.0  # longest time between two samples of a person [s]
+_ROUGH = 1.0  # greatest roughness of ways; people who are mixed up have 1.4 and more
 _MIN_STEPS = 20  # number of steps that allows a judgement
 REGULAR = 0.5  # greatest interquartile range of the sampling interval, over its median, of a regular clock
 
@@ -28,6 +29,7 @@ class Motion(NamedTuple):
     interval : median time between two samples of a person [s].
     irregularity : interquartile range of that time, over its median.
     width : width of the site [m].
+    roughness : median change of the velocity from one second to the next, over the median speed.
     has_whole_ids : whether all ids are whole numbers.
     doubled : fraction of rows at whose time the person has another row.
     """
@@ -37,6 +39,7 @@ class Motion(NamedTuple):
     interval: float
     irregularity: float
     width: float
+    roughness: float
     has_whole_ids: bool
     doubled: float
 
@@ -59,6 +62,7 @@ class Motion(NamedTuple):
             and self.irregularity <= REGULAR
             and 0.005 <= self.interval <= _LONGEST_STEP
             and 1 <= self.width <= MAX_SITE
+            and self.roughness < _ROUGH
             and self.has_whole_ids
             and self.doubled < 0.01
         )
@@ -75,7 +79,12 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
     by_second = person[first][1:] == person[first][:-1]
     if by_second.sum() < _MIN_STEPS:
         return None
+    steps_by_second = np.diff([x[first], y[first]], axis=1) / np.where(
+        by_second, np.diff(t[first]), np.nan
+    )
     moved = np.hypot(np.diff(x[first]), np.diff(y[first]))[by_second]
+    change = np.hypot(*np.diff(steps_by_second, axis=1))
+    change = change[np.isfinite(change)]
     median, fast = np.quantile(moved / np.diff(t[first])[by_second], [0.5, 0.9])
     low, step, high = np.quantile(steps, [0.25, 0.5, 0.75])
     return Motion(
@@ -84,6 +93,7 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
         interval=float(step),
         irregularity=float((high - low) / step) if step > 0 else np.inf,
         width=float(np.ptp(np.quantile([x, y], [0.01, 0.99], axis=1), axis=0).max()),
+        roughness=float(np.median(change) / median) if len(change) and median else 0.0,
         has_whole_ids=bool((person % 1 == 0).all()),
         doubled=float((steps <= 0).mean()),
     )
@@ -106,7 +116,8 @@ def find_walking(
 
     Returns
     -------
-    Four numbers of columns.  Of several orders, t has the most regular clock, and most columns are in place.
+    Four numbers of columns.  Of several orders, ways are smoothest, t has the most regular clock, and most
+    columns are in place.
     """
     known, found = known or {}, []
     free = [k for k in range(len(columns)) if k not in known.values()]
@@ -120,5 +131,12 @@ def find_walking(
         motion = measure_motion(rows * [[1 / rate], [1.0], [metres], [metres]])
         if motion is not None and motion.is_walking:
             n_moved = sum(k != place for place, k in enumerate(order))
-            found.append((round(motion.irregularity, 3), n_moved, order))
-    return min(found)[2] if found else None
+            found.append(
+                (
+                    round(motion.roughness, 1),
+                    round(motion.irregularity, 3),
+                    n_moved,
+                    order,
+                )
+            )
+    return min(found)[-1] if found else None

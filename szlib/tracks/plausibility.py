@@ -14,9 +14,9 @@ import numpy as np
 import polars as pl
 
 from ..core.errors import DataError, warn
-from .formats import TrackFormat
 from .motion import FASTEST, MAX_SITE, REGULAR, find_walking, measure_motion
-from .options import FRAMES, UNITS, advise
+from .recipe import TIME_UNITS, UNITS, Recipe, advise
+from .shapes import SHAPES
 
 _MIN_SITE = 0.5  # a smaller site [m] means that metres were read as millimetres
 # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
@@ -24,24 +24,36 @@ _SPRINT, _JUMP = (12.5, 100.0)
 _ROWS = 200_000  # number of rows that are looked at
 _DEGREE = 111_320.0  # metres in a degree of latitude, or of longitude at the equator
 _WALK = 1.2  # a usual walking speed [m/s]
+_FRAMES = 25.0  # a usual frame rate [1/s], for suggestions
+_SURE = ("atc-raw", "ewap")  # shapes whose units cannot be others
 
 
 def check_people(
-    rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit_given: bool
+    rows: pl.DataFrame, recipe: Recipe, path: Path, *, is_unit_given: bool
 ) -> None:
     """Raise DataError where people cannot move as they do in a table, and suggest another reading.
 
     Parameters
     ----------
-    rows : t, id, x, y in the units of the file.
-    layout, path : the format of the file, and the file.
+    rows : t [s], id, x, y [m].
+    recipe, path : how the file was read, and the file.
     is_unit_given : whether the user has given the unit; then a DataWarning is enough, as where people may
         just all be standing.
     """
-    found = measure_motion(_convert(rows, layout))
-    if found is None or not (found.fault or found.irregularity > REGULAR):
+    if is_table_known(recipe):
         return
-    advice = suggest_reading(rows, layout)
+    seen = first_rows(rows)
+    found = measure_motion(seen)
+    if found is None:
+        days = (seen[0] - seen[0].min()) * TIME_UNITS["days"]
+        motion = measure_motion(np.vstack([days, seen[1:]]))
+        if "t" in (recipe.columns or {}) and motion and motion.is_walking:
+            advice = advise(time_unit="days")
+            raise DataError(f"{path}: times look like days of Excel: {advice}")
+        return
+    if not (found.fault or found.irregularity > REGULAR):
+        return
+    advice = suggest_reading(seen, recipe)
     if not (found.fault or advice):
         return  # people may be seen at irregular times
     message = f"{path}: {found.fault or 'people are seen at irregular times'}" + (
@@ -54,6 +66,12 @@ def check_people(
             scale = float(f"{_WALK / found.median_speed:.2g}")
             message += f"; if they are pixels in which people walk at {_WALK:g} m/s, {advise(scale=scale)}"
         raise DataError(f"{message}; if people do move like that, {advise(unit='m')}")
+
+
+def is_table_known(recipe: Recipe) -> bool:
+    """Whether files of the shape in the `recipe` cannot have other units or columns."""
+    shape = SHAPES[recipe.file_format or "tidy"]
+    return shape.parse is not None or shape.name in _SURE
 
 
 def find_implausible(rows: pl.DataFrame) -> list[str]:
@@ -84,74 +102,87 @@ def find_implausible(rows: pl.DataFrame) -> list[str]:
     return texts
 
 
-def suggest_reading(rows: pl.DataFrame, layout: TrackFormat) -> str:
-    """Advice for the first other reading of `rows`, read as `layout`, in which people walk; empty if none."""
-    seen = _convert(rows, layout)
-    for reading, advice in _readings(seen, layout):
+def suggest_reading(seen: np.ndarray, recipe: Recipe) -> str:
+    """Advice for the first reading, other than the `recipe`, in which people walk; empty if there is none.
+
+    The rows t [s], id, x, y [m] were `seen` with the recipe, shape (4, n).
+    """
+    seen = seen[:, np.isfinite(seen).all(axis=0)]
+    if not seen.size:
+        return ""
+    for reading, advice in _readings(seen, recipe):
         found = measure_motion(reading)
         if found is not None and found.is_walking:
             return advice
-    order = find_walking(seen)
-    if order is None or order == (0, 1, 2, 3):
+    order, columns = find_walking(seen), dict(recipe.columns or {})
+    if order is None or order == (0, 1, 2, 3) or "t" not in columns:
         return ""
     names = ("t", "id", "x", "y")
-    exchanged = {names[k]: names[at] for k, at in enumerate(order) if at != k}
-    return f"columns look exchanged: if they are, {advise(columns=layout.name_columns(**exchanged))}"
+    exchanged = {names[k]: columns[names[at]] for k, at in enumerate(order) if at != k}
+    if any(isinstance(at, int) for at in columns.values()):
+        exchanged = {name: columns[name] for name in names} | exchanged
+    return f"columns look exchanged: if they are, {advise(columns=exchanged)}"
 
 
-def check_unit(rows: pl.DataFrame, layout: TrackFormat, path: Path) -> None:
-    """Raise DataError where `rows` x, y of file `path`, read as `layout`, span an impossible site."""
-    positions = rows.select("x", "y").to_numpy()
-    if (
-        layout.metres < 1
-        and (reach := float(np.abs(positions).max())) * layout.metres < _MIN_SITE
-    ):
+def check_unit(rows: pl.DataFrame, recipe: Recipe, path: Path) -> None:
+    """Raise DataError where `rows` x, y [m] of file `path`, read with a `recipe`, span an impossible site."""
+    positions, metres = rows.select("x", "y").to_numpy(), recipe.metres or 1.0
+    if metres < 1 and (reach := float(np.abs(positions).max())) < _MIN_SITE:
         raise DataError(
-            f"{path}: positions reach only {reach:.3g}, expected millimetres as in {layout.name}; if they "
-            f"are metres, {advise(unit='m')}; if the site is that small, {advise(unit='mm')}"
+            f"{path}: positions reach only {reach / metres:.3g}, expected millimetres as in "
+            f"{recipe.file_format}; if they are metres, {advise(unit='m')}; if the site is that small, "
+            f"{advise(unit='mm')}"
         )
-    if layout.metres == 1:
-        low, high = np.quantile(positions, [0.01, 0.99], axis=0)
-        if (spread := float((high - low).max())) > MAX_SITE:
-            raise DataError(
-                f"{path}: positions spread over {spread:.3g}, expected metres as in {layout.name}; if they "
-                f"are millimetres, {advise(unit='mm')}; if the site is that wide, {advise(unit='m')}"
-            )
+    low, high = np.quantile(positions, [0.01, 0.99], axis=0)
+    if metres == 1 and (spread := float((high - low).max())) > MAX_SITE:
+        raise DataError(
+            f"{path}: positions spread over {spread:.3g}, expected metres as in {recipe.file_format}; if "
+            f"they are millimetres, {advise(unit='mm')}; if the site is that wide, {advise(unit='m')}"
+        )
 
 
-def _convert(rows: pl.DataFrame, layout: TrackFormat) -> np.ndarray:
-    """The first rows as t [s], id, x, y [m], shape (4, n)."""
+def first_rows(rows: pl.DataFrame) -> np.ndarray:
+    """The first of `rows` as t, id, x, y, shape (4, n)."""
     large = pl.col("id").abs().max() >= 2**53  # floats do not tell such ids apart
     person = pl.when(large).then(pl.col("id").rank("dense")).otherwise("id")
-    first = rows.head(_ROWS).select("t", person, "x", "y").to_numpy().astype(float).T
-    return np.asarray(
-        first * np.array([[layout.seconds], [1.0], [layout.metres], [layout.metres]])
-    )
+    return rows.head(_ROWS).select("t", person, "x", "y").to_numpy().astype(float).T
 
 
-def _readings(
-    rows: np.ndarray, layout: TrackFormat
-) -> Iterator[tuple[np.ndarray, str]]:
+def _readings(rows: np.ndarray, recipe: Recipe) -> Iterator[tuple[np.ndarray, str]]:
     """Other readings of rows (4, n), the likeliest first, each with its advice."""
-    t, person, x, y = rows[:, np.isfinite(rows).all(axis=0)]
+    t, person, x, y = rows
+    metres = recipe.metres or 1.0
     for name, unit in (("millimetres", "mm"), ("centimetres", "cm"), ("feet", "ft")):
-        scaled = np.array([t, person, x * UNITS[unit], y * UNITS[unit]])
-        yield scaled, f"positions look like {name}: {advise(unit=unit)}"
-    for name, rate in (("milliseconds", 1000.0), ("numbers of frames", FRAMES)):
-        if name == "milliseconds" or (t % 1 == 0).all():
-            advice = advise(columns=layout.name_columns(frame="t"), frame_rate=rate)
+        factor = UNITS[unit] / metres
+        yield (
+            np.array([t, person, x * factor, y * factor]),
+            f"positions look like {name}: {advise(unit=unit)}",
+        )
+    time = (recipe.columns or {}).get("t")
+    if time is not None and recipe.time_unit is None:
+        yield (
+            np.array([t / 1000, person, x, y]),
+            f"times look like milliseconds: {advise(time_unit='ms')}",
+        )
+        if (t % 1 == 0).all():
+            columns = {"frame": time}
+            if isinstance(time, int):
+                columns |= {
+                    name: (recipe.columns or {})[name] for name in ("id", "x", "y")
+                }
             yield (
-                np.array([t / rate, person, x, y]),
-                f"times look like {name}: {advice}",
+                np.array([t / _FRAMES, person, x, y]),
+                "times look like numbers of frames: name them, and give the frame rate of the video; "
+                f"{_FRAMES:g} is only a guess: {advise(columns=columns, frame_rate=_FRAMES)}",
             )
-    project = "project them to metres first: x = 111320 cos(lat) (lon - lon0), y = 111320 (lat - lat0)"
     for one, other, names in (
         (x, y, "longitude and latitude"),
-        (y, x, "latitude and longitude"),
+        (y, x, "latitude and longitude: exchange the columns x and y, and"),
     ):
         if (np.abs(one) <= 180).all() and (np.abs(other) <= 90).all():
             east, north = one * _DEGREE * np.cos(np.radians(other)), other * _DEGREE
+            origin = [round(float(np.median(values)), 2) for values in (one, other)]
             yield (
                 np.array([t, person, east, north]),
-                f"positions look like degrees of {names}: {project}",
+                f"positions look like degrees of {names}: {advise(unit='deg', origin=origin)}",
             )

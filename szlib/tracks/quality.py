@@ -5,16 +5,17 @@ Files are streamed: a full raw day is reduced to one row a person and second.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import polars as pl
 
-from .formats import TrackFormat, open_file
 from .motion import measure_motion
-from .options import ReadOptions
+from .readers import open_file, rejection_reason
+from .recipe import Recipe, find_recipe
 
 STANDING = 0.1
 """A person who moves less than this within a second stands [m] (measured: sensor noise is smaller)."""
@@ -27,15 +28,13 @@ ROWS = 200_000
 _MAP, _INK = (60, " .:+#")
 
 
-def summarise_seconds(
-    path: str | Path, options: ReadOptions | None = None
-) -> pd.DataFrame:
+def summarise_seconds(path: str | Path, recipe: Recipe | None = None) -> pd.DataFrame:
     """Summarise a file by person and second.
 
     Parameters
     ----------
     path : a file that `szlib.read_tracks` reads, plain or .gz.
-    options : how it is read; None takes the defaults.
+    recipe : how it is read; None takes that beside it, or finds one.
 
     Returns
     -------
@@ -59,13 +58,10 @@ def summarise_seconds(
     1     1.0     2    1.2
     2     2.0     2    NaN
     """
-    with open_file(Path(path), options or ReadOptions()) as (layout, scan, plain):
-        speed = pl.lit(np.nan)
-        if layout.speed_field:
-            number, unit = layout.speed_field
-            layout = replace(layout, columns={**layout.columns, "speed": number})
-            scan, speed = layout.scan(plain), pl.col("speed").mean() * unit
-        rows = _usable_rows(layout, scan).group_by("id", second=pl.col("t").floor())
+    with _usable_rows(path, recipe) as (_, scan):
+        names = scan.collect_schema().names()
+        speed = pl.col("speed").mean() if "speed" in names else pl.lit(np.nan)
+        rows = scan.group_by("id", second=pl.col("t").floor())
         summary = rows.agg(
             pl.col("x", "y").sort_by("t").first(), rows=pl.len(), sensor_speed=speed
         )
@@ -77,9 +73,9 @@ def summarise_seconds(
 
 
 def measure_frame_intervals(
-    path: str | Path, options: ReadOptions | None = None
+    path: str | Path, recipe: Recipe | None = None
 ) -> np.ndarray:
-    """Times from one frame of file `path`, read with `options`, to the next [s].
+    """Times from one frame of file `path`, read with a `recipe`, to the next [s].
 
     A frame is a time at which somebody was seen.
 
@@ -91,17 +87,15 @@ def measure_frame_intervals(
     >>> measure_frame_intervals("stand.csv")
     array([0.5, 1. ])
     """
-    with open_file(Path(path), options or ReadOptions()) as (layout, scan, _):
+    with open_file(path := Path(path), find_recipe([path], recipe)) as (_, scan):
         frames = scan.select(pl.col("t").drop_nulls().unique()).collect(
             engine="streaming"
         )["t"]
-    return np.asarray(np.diff(np.sort(frames.to_numpy())) * layout.seconds)
+    return np.asarray(np.diff(np.sort(frames.to_numpy())))
 
 
-def summarise_people(
-    path: str | Path, options: ReadOptions | None = None
-) -> pd.DataFrame:
-    """Summarise the file `path`, read with `options`, by person.
+def summarise_people(path: str | Path, recipe: Recipe | None = None) -> pd.DataFrame:
+    """Summarise the file `path`, read with a `recipe`, by person.
 
     Columns id, first_seen, last_seen, longest_gap [s], rows.
 
@@ -115,8 +109,8 @@ def summarise_people(
     0   1         0.0        1.5          1.0     3
     """
     time = pl.col("t")
-    with open_file(Path(path), options or ReadOptions()) as (layout, scan, _):
-        people = _usable_rows(layout, scan).group_by("id")
+    with _usable_rows(path, recipe) as (_, scan):
+        people = scan.group_by("id")
         gap = time.sort().diff().max()
         summary = people.agg(
             first_seen=time.min(), last_seen=time.max(), longest_gap=gap, rows=pl.len()
@@ -124,16 +118,26 @@ def summarise_people(
         return summary.sort("id").collect(engine="streaming").to_pandas()
 
 
-def _usable_rows(layout: TrackFormat, scan: pl.LazyFrame) -> pl.LazyFrame:
-    """Usable rows: id, t [s], x, y [m], and what else the scan holds."""
-    time, place = pl.col("t") * layout.seconds, pl.col("x", "y") * layout.metres
-    return scan.filter(layout.rejection_reason().is_null()).with_columns(
-        time, place, id="exact_id"
-    )
+@contextmanager
+def _usable_rows(
+    path: str | Path, recipe: Recipe | None
+) -> Iterator[tuple[Recipe, pl.LazyFrame]]:
+    """The recipe of a file, and a scan of its usable rows: id, t [s], x, y [m], and what else it holds."""
+    with open_file(path := Path(path), find_recipe([path], recipe)) as (found, scan):
+        yield (
+            found,
+            scan.filter(rejection_reason(scan).is_null()).with_columns(id="exact_id"),
+        )
 
 
-def describe_file(path: str | Path, options: ReadOptions | None = None) -> str:
-    """Describe the file `path`, read with `options`, in a few lines, by its first rows.
+def find_reading(path: Path, recipe: Recipe) -> Recipe:
+    """The complete recipe by which file `path` is read with a `recipe`."""
+    with open_file(path, recipe) as (found, _):
+        return found
+
+
+def describe_file(path: str | Path, recipe: Recipe | None = None) -> str:
+    """Describe the file `path`, read with a `recipe`, in a few lines, by its first rows.
 
     They say what it was taken for, how people move in it and where, and draw a map.
 
@@ -147,14 +151,13 @@ def describe_file(path: str | Path, options: ReadOptions | None = None) -> str:
     walk.csv is read as tidy: t = time, id = ped, x = x, y = y
     ...
     """
-    with open_file(path := Path(path), options or ReadOptions()) as (layout, scan, _):
-        rows = (
-            _usable_rows(layout, scan).head(ROWS).select("t", "id", "x", "y").collect()
-        )
+    path = Path(path)
+    with _usable_rows(path, recipe) as (found, scan):
+        rows = scan.head(ROWS).select("t", "id", "x", "y").collect()
     t, person, x, y = rows.to_numpy().T
     lines = [
-        f"{path.name} is read as {layout.name}"
-        + (f": {layout.text}" if layout.text else "")
+        f"{path.name} is read as {found.file_format}: "
+        + ", ".join(f"{name} = {at}" for name, at in (found.columns or {}).items())
     ]
     if rows.height == 0:
         return lines[0]

@@ -6,7 +6,9 @@ A file that cannot be used raises a DataError that names the file and the line.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -18,34 +20,55 @@ import polars as pl
 from ..core.errors import DataError, warn
 from ..core.input_files import printable
 from . import funnels
-from .formats import TrackFormat, open_file
-from .formats.base import EXPECTED, MISSING
-from .formats.tidy import is_table, open_table
-from .options import ReadOptions, advise
-from .plausibility import check_people, check_unit, find_implausible, suggest_reading
-from .recordings import LoadedFile, separate_recordings
+from .plausibility import (
+    check_people,
+    check_unit,
+    find_implausible,
+    first_rows,
+    is_table_known,
+    suggest_reading,
+)
+from .recipe import Recipe, advise, find_recipe
+from .recordings import LoadedFile, file_stem, separate_recordings
+from .rows import (
+    EXPECTED,
+    FARTHEST,
+    LAST_SECOND,
+    MISPLACED,
+    MISSING,
+    Rows,
+    load_rows,
+    open_source,
+    scan_streamed,
+)
+from .shapes import SHAPES, require_format
+from .sources import is_table, open_table, require_memory, unpacked
 
 MAX_REJECTED = 0.05
-"""Share of the rows of a file that may be unusable, unless `ReadOptions` give another (assumed)."""
+"""Share of the rows of a file that may be unusable, unless a `Recipe` gives another (assumed)."""
 MOST_DOUBLED = 0.2
 """Share of rows up to which a person may have a second place at one time (assumed)."""
+# A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
+CALENDAR_BEGINS = 1e8
+_DAY, _MINUTE = 86_400, 60  # [s]
+_HEAD = 1 << 16  # bytes of a text by which its day is found
 
 
 def read_raw(
-    paths: Any, *, options: ReadOptions | None = None, exclude: Iterable[str] = ()
+    paths: Any, *, recipe: Recipe | None = None, exclude: Iterable[str] = ()
 ) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
     Parameters
     ----------
     paths : as in `szlib.read_tracks`.
-    options : how files are read; None takes the defaults.
+    recipe : how files are read; None takes that beside the files, or finds one.
     exclude : days "YYYY-MM-DD" to leave out.
 
     Returns
     -------
     A table for `to_clock`.  ``.attrs["max_gap"]`` is the longest gap [s] of the format, ``.attrs["funnel"]``
-    counts every row, and states the frame rate at which an EWAP file was read.
+    counts every row, and states the frame rate; ``.attrs["recipe"]`` says how the first file was read.
 
     Raises
     ------
@@ -61,19 +84,19 @@ def read_raw(
     0  walk   1  0.0  0.0  0.0
     1  walk   1  0.4  0.5  0.0
     """
-    options = options or ReadOptions()
     sources = (
         [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
     )
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
     if not sources:
         raise DataError("no track file was given; pass at least one path")
+    recipe = find_recipe(sources, recipe)
     names = (
         Path(f"table-{k}") if is_table(each) else Path(each)
         for k, each in enumerate(sources, start=1)
     )
     files = [
-        _read_file(source, path, options)
+        _read_file(source, path, recipe)
         for source, path in zip(sources, names, strict=True)
     ]
     return merge(separate_recordings(files), excluded)
@@ -125,11 +148,12 @@ def merge(
     )
     names = pd.Index(days.cast(pl.String).to_list())
     frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, names)))
-    gaps = [file.layout.max_gap for file in files if file.layout.max_gap is not None]
+    gaps = [file.recipe.max_gap for file in files if file.recipe.max_gap is not None]
     frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(files) else None
-    areas = {file.layout.area for file in files}
+    areas = {file.recipe.area for file in files}
     if len(areas) == 1 and (area := areas.pop()) is not None:
-        frame.attrs["area"] = [bound for bounds in area for bound in bounds]
+        frame.attrs["area"] = area
+    frame.attrs["recipe"] = files[0].recipe.as_json()
     reasons = {"excluded day": merged.height - wanted.height, **doubled}
     stages = [stage for file in files for stage in file.stages]
     for text in find_implausible(rows):
@@ -165,85 +189,144 @@ def is_sorted(person: np.ndarray, time: np.ndarray) -> bool:
     return bool(((person[1:] > person[:-1]) | (same & (time[1:] >= time[:-1]))).all())
 
 
-def _read_file(source: Any, path: Path, options: ReadOptions) -> LoadedFile:
+def _read_file(source: Any, path: Path, recipe: Recipe) -> LoadedFile:
     """The usable rows of one file or table."""
-    if is_table(source):
-        layout, scan = open_table(source, path, options)
-        rows = scan.collect()
-        good, reasons, first = reject_rows(rows, layout)
-    else:
-        with open_file(path, options, is_whole=True) as (layout, scan, plain):
-            rows = scan.collect()
-            good, reasons, first = reject_rows(rows, layout, plain)
-    hint = (
-        suggest_reading(rows, layout)
-        if layout.is_ambiguous and 2 * good.height < rows.height
-        else ""
+    if not is_table(source):
+        with unpacked(path) as plain:
+            if streamed := scan_streamed(plain, path, recipe):
+                found, scan = streamed
+                require_memory(plain.stat().st_size, f"{path}")
+                return _accept(Rows(scan.collect(), found), path, recipe)
+            rows = load_rows(*open_source(plain, path, recipe), path)
+            return _accept(rows, path, recipe)
+    if not hasattr(source, "to_point_gdf") and hasattr(source, "frame_rate"):  # PedPy's
+        stated = Recipe(columns={"frame": "frame"}, frame_rate=float(source.frame_rate))
+        source, recipe = source.data, recipe.over(stated)
+    found = replace(recipe, file_format="tidy")
+    return _accept(load_rows(open_table(source, f"{path}"), found, path), path, recipe)
+
+
+def _accept(rows: Rows, path: Path, recipe: Recipe) -> LoadedFile:
+    """The usable `rows` of file `path`, for which `recipe` was given."""
+    good, reasons, first = reject_rows(rows.table, rows)
+    is_known = is_table_known(rows.recipe)
+    is_doubtful = 2 * good.height < rows.table.height and not is_known
+    hint = suggest_reading(first_rows(rows.table), rows.recipe) if is_doubtful else ""
+    stage = read_stage(path, rows.recipe, good.height, reasons, first, hint)
+    check_people(good, rows.recipe, path, is_unit_given=recipe.has_places)
+    if not recipe.has_places:
+        check_unit(good, rows.recipe, path)
+    return LoadedFile(path, with_days(good, path, rows.recipe), [stage], rows.recipe)
+
+
+@contextmanager
+def open_file(path: Path, recipe: Recipe) -> Iterator[tuple[Recipe, pl.LazyFrame]]:
+    """Open file `path` without reading it as a whole, where its shape allows that.
+
+    Gives the `recipe` completed by the file, and a scan of its rows: line, ragged, t [s], id, exact_id, x, y
+    [m], and, where the file has it, speed [m/s].  Raises DataError where the file cannot be read.
+    """
+    with unpacked(path) as plain:
+        if (streamed := scan_streamed(plain, path, recipe)) is not None:
+            yield streamed
+            return
+        rows = load_rows(*open_source(plain, path, recipe), path)
+        yield rows.recipe, rows.table.lazy()
+
+
+def is_streamed(path: Path, recipe: Recipe) -> bool:
+    """Whether file `path` is read in blocks with a `recipe`."""
+    return SHAPES[find_format(path, recipe).file_format or "tidy"].is_streamed
+
+
+def find_format(path: Path, recipe: Recipe) -> Recipe:
+    """The `recipe` completed by that of the shape of file `path`; itself where the file cannot be read."""
+    require_format(recipe)
+    with suppress(DataError, OSError), unpacked(path) as plain:
+        return open_source(plain, path, recipe, size=_HEAD)[1]
+    return recipe
+
+
+def find_day(path: Path, recipe: Recipe) -> str | None:
+    """The day on which file `path`, read with a `recipe`, begins; None where it has none."""
+    require_format(recipe)
+    with suppress(DataError, OSError), unpacked(path) as plain:
+        source, found = open_source(plain, path, recipe, size=_HEAD)
+        if SHAPES[found.file_format or "tidy"].is_sequence or "day" in (
+            found.columns or {}
+        ):
+            return None
+        rows = load_rows(source, found, path, is_head=True)
+        good = reject_rows(rows.table)[0]
+        has_own = "day" in (rows.recipe.columns or {})
+        if good.height and not has_own and good["t"][0] >= CALENDAR_BEGINS:
+            return str(with_days(good.head(1), path, rows.recipe)["day"][0])
+    return None
+
+
+def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
+    """Why a row of a `table` as from `open_file` is rejected; null where it is usable."""
+    numbers = pl.col("t", "id", "x", "y")
+    reasons = {
+        "missing or extra fields": pl.col("ragged"),
+        MISSING: pl.any_horizontal(numbers.is_null()),
+        "not finite": ~pl.all_horizontal(numbers.is_finite()),
+        "id not a whole number": pl.col("exact_id").is_null(),
+        "time not in seconds since 1970": pl.col("t").abs() > LAST_SECOND,
+        MISPLACED: pl.max_horizontal(pl.col("x", "y").abs()) > FARTHEST,
+    }
+    if "day" in table.collect_schema():
+        reasons["no day"] = pl.col("day").is_null()
+    return pl.coalesce(
+        pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons.items()
     )
-    most = options.max_rejected
-    stage = read_stage(path, layout, good.height, reasons, first, hint, most)
-    if layout.is_ambiguous:
-        check_people(good, layout, path, is_unit_given=options.metres is not None)
-    if options.metres is None:
-        check_unit(good, layout, path)
-    return LoadedFile(path, layout.to_metres(good, path, options.tz), [stage], layout)
 
 
 def reject_rows(
-    rows: pl.DataFrame, layout: TrackFormat, plain: Path | None = None
+    table: pl.DataFrame, rows: Rows | None = None
 ) -> tuple[pl.DataFrame, dict[str, int], tuple[int, str] | None]:
-    """The usable `rows` of a file in this `layout`.
+    """The usable rows of a `table` as from `open_file`.
 
-    Also returns the number of the other rows by reason, and line and reason of the first one, with what file
-    `plain` holds there.
+    Also returns the number of the other rows by reason, and line and reason of the first one, with what the
+    file holds there if its `rows` are given.
     """
-    rows = rows.with_columns(reason=layout.rejection_reason())
-    bad = rows.filter(pl.col("reason").is_not_null())
-    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
+    marked = table.with_columns(reason=rejection_reason(table))
+    bad = marked.filter(pl.col("reason").is_not_null())
+    counts = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     first = bad.select("line", "reason").row(0) if bad.height else None
-    if first and first[1] == MISSING:
+    if first and first[1] == MISSING and rows is not None:
         name = next(name for name in ("t", "id", "x", "y") if bad[name][0] is None)
-        first = (first[0], f"{MISSING} ({layout.show_field(plain, first[0], name)})")
-    return (
-        rows.filter(pl.col("reason").is_null()).with_columns(id="exact_id"),
-        reasons,
-        first,
-    )
+        first = (first[0], f"{MISSING} ({rows.show_field(first[0], name)})")
+    good = marked.filter(pl.col("reason").is_null()).with_columns(id="exact_id")
+    return good.drop("reason"), counts, first
 
 
 def read_stage(
     path: Path,
-    layout: TrackFormat,
+    recipe: Recipe,
     n_good: int,
     reasons: dict[str, int],
     first: tuple[int, str] | None,
     hint: str = "",
-    max_rejected: float | None = None,
 ) -> dict[str, Any]:
-    """The funnel stage of one file.
+    """The funnel stage of file `path`, read with a `recipe`, of which `n_good` rows are usable.
 
-    Parameters
-    ----------
-    path, layout : the file and its format.
-    n_good : number of usable rows.
-    reasons : number of rejected rows by reason.
-    first : line and reason of the first rejected row.
-    hint : what to do, if most rows are rejected.
-    max_rejected : as in `szlib.ReadOptions`.
-
-    Raises
-    ------
-    DataError : more than `max_rejected` of the rows are rejected, or there is none.  Fewer are a DataWarning.
+    `hint` says what to do if most are not, `reasons` count the others, `first` is line and reason of the
+    first of these.  Raises DataError where there is no row, or more than `Recipe.max_rejected` are rejected.
+    Fewer are a DataWarning.
     """
     n_bad = sum(reasons.values())
-    most = MAX_REJECTED if max_rejected is None else max_rejected
+    most = MAX_REJECTED if recipe.max_rejected is None else recipe.max_rejected
     if first and n_bad > most * (n_bad + n_good):
         share = ceil(100 * n_bad / (n_bad + n_good)) / 100
-        if not hint and n_good:
-            hint = f"if the others are right: {advise(max_rejected=share)}"
+        advice = (
+            f"if the others are right: {advise(max_rejected=share)}"
+            if n_good
+            else EXPECTED
+        )
         raise DataError(
             f"{path}, line {first[0]}: {first[1]}; {n_bad} of {n_bad + n_good} rows cannot be used "
-            f"as {layout.name}; {hint or EXPECTED}"
+            f"as {recipe.file_format}; {hint or advice}"
         )
     if n_good == 0:
         raise DataError(f"{path}: holds no row; {EXPECTED}")
@@ -252,8 +335,42 @@ def read_stage(
         _warn_rejected(
             f"{path.name}, first at line {first[0]}{detail and f' ({detail}'}", reasons
         )
-    rate = f" at {1 / layout.seconds:g} frames/s" if layout.seconds != 1 else ""
+    rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
     return funnels.stage(f"read {path.name}{rate}", n_good + n_bad, n_good, reasons)
+
+
+def with_days(good: pl.DataFrame, path: Path, recipe: Recipe) -> pl.DataFrame:
+    """The `good` rows of file `path` as day, id, t, x, y.
+
+    The day is the date in the time zone of the `recipe`, or the file's name if its clock does not count from
+    1970.
+    """
+    if "day" not in good.columns:
+        last = good["t"].max()
+        is_named = SHAPES[recipe.file_format or "tidy"].is_sequence or (
+            isinstance(last, float) and last < CALENDAR_BEGINS
+        )
+        day = (
+            pl.lit(file_stem(path))
+            if is_named
+            else _find_days(good["t"], recipe.tz or "UTC")
+        )
+        good = good.with_columns(day=day)
+    return good.select("day", "id", "t", "x", "y")
+
+
+def _find_days(t: pl.Series, tz: str) -> pl.Series | pl.Expr:
+    """The local date of each time [s since 1970]; a single one where all minutes have the same date."""
+    first, last = (int(moment) // _MINUTE * _MINUTE for moment in (t.min(), t.max()))  # type: ignore[arg-type]
+    if last - first < _DAY:
+        days = _local_date(pl.Series(range(first, last + 1, _MINUTE)), tz).unique()
+        if len(days) == 1:
+            return pl.lit(days[0])
+    return _local_date(t.floor().cast(pl.Int64), tz)
+
+
+def _local_date(t: pl.Series, tz: str) -> pl.Series:
+    return pl.from_epoch(t, time_unit="s").dt.convert_time_zone(tz).dt.date()
 
 
 def _warn_rejected(where: str, reasons: dict[str, int]) -> None:

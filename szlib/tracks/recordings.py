@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
-from zoneinfo import ZoneInfo
 
 import polars as pl
 
 from ..core.errors import DataError, warn
 from ..core.input_files import printable
-from .formats import TrackFormat, find_format
-from .formats.base import CALENDAR_BEGINS, decode_line, file_stem
-from .formats.unpack import read_first_line
-from .options import ReadOptions
+from .recipe import Recipe
+from .shapes import SHAPES
 
 # A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
 # distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
@@ -30,13 +26,18 @@ class LoadedFile(NamedTuple):
     path : the file.
     rows : its usable rows: day, id, t [s], x, y [m].
     stages : its funnel.
-    layout : its format.
+    recipe : how it was read, with its columns.
     """
 
     path: Path
     rows: pl.DataFrame
     stages: list[dict[str, Any]]
-    layout: TrackFormat
+    recipe: Recipe
+
+    @property
+    def is_sequence(self) -> bool:
+        """Whether each file of this shape is a recording of its own, without a calendar."""
+        return SHAPES[self.recipe.file_format or "tidy"].is_sequence
 
     def with_day(self, day: pl.Expr) -> LoadedFile:
         """The same rows under another `day`."""
@@ -54,7 +55,7 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     found = list(files)
     if len(files) < 2:
         return found
-    check_names([file_stem(file.path) for file in files if file.layout.is_sequence])
+    check_names([file_stem(file.path) for file in files if file.is_sequence])
     names = name_recordings([file.path for file in files])
     has_text_day = [file.rows["day"].dtype == pl.String for file in files]
     is_named = [
@@ -63,7 +64,7 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     ]
     candidates = [
         file.rows.with_columns(day=pl.lit(""))
-        if named and not file.layout.is_sequence
+        if named and not file.is_sequence
         else file.rows.head(0)
         for file, named in zip(files, is_named, strict=True)
     ]
@@ -148,28 +149,9 @@ def name_recordings(files: Sequence[Path]) -> list[str]:
     ]
 
 
-def find_day(path: Path, options: ReadOptions) -> str | None:
-    """The calendar day on which file `path`, read with `options`, begins; None where its format has none."""
-    first = decode_line(read_first_line(path))
-    try:
-        layout = find_format(path, options)
-        if layout.is_sequence or not layout.separator:
-            return None
-        time = float(layout.split(first)[layout.columns["t"]]) + layout.clock_start(
-            path, first
-        )
-        if not time >= CALENDAR_BEGINS:
-            return None
-        return datetime.fromtimestamp(time, ZoneInfo(options.tz or layout.tz)).strftime(
-            "%Y-%m-%d"
-        )
-    except (
-        LookupError,
-        ValueError,
-        OverflowError,
-        OSError,
-    ):  # a table, or a damaged first row
-        return None
+def file_stem(path: Path) -> str:
+    """The name of file `path` without its endings."""
+    return path.name.split(".")[0]
 
 
 def check_names(names: Sequence[str]) -> None:

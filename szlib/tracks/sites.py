@@ -30,9 +30,9 @@ from ..core.errors import DataError
 from ..core.input_files import read_small, reading
 from . import funnels
 from .clock import read_tracks, to_clock
-from .formats.parsed import read_magni_rows
-from .options import ReadOptions
+from .recipe import Recipe
 from .recordings import check_names
+from .shapes import read_magni_rows
 
 # frames a second of the video of Grand Central; every 20th is annotated
 GRAND_CENTRAL_RATE = 25.0
@@ -136,7 +136,7 @@ def read_edinburgh(
     )
     if not files:
         raise DataError("no file of Edinburgh was given; pass at least one path")
-    ReadOptions(frame_rate=frame_rate)  # checks the rate
+    Recipe(frame_rate=frame_rate)  # checks the rate
     check_names([file.stem for file in files])
     parts, n_repeated = zip(
         *(_read_edinburgh_file(file, frame_rate) for file in files), strict=True

@@ -25,6 +25,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import fields, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -138,8 +139,16 @@ def _add_arguments(parser: Any, arguments: dict[str, dict[str, Any]]) -> None:
         parser.add_argument(*names.split(), **options)
 
 
-def _read_options(options: argparse.Namespace) -> dict[str, Any]:
-    """The options of `ReadOptions` that a command gives."""
+def _read_options(
+    options: argparse.Namespace, data: str | Sequence[str]
+) -> dict[str, Any]:
+    """The recipe of a command: single values, over that of --recipe or of a file beside the data, as JSON."""
+    from ..tracks import datasets
+    from ..tracks.recipe import Recipe, find_recipe
+
+    names = [data] if isinstance(data, str) else list(data)
+    is_named = any(name in datasets.NAMES for name in names)
+    files = [] if is_named or any(map(os.path.isdir, names)) else datasets.find(names)
     columns: dict[str, str | int] = {}
     for pair in (
         pair for text in options.columns for pair in re.split(r",(?=[a-z]+=)", text)
@@ -152,20 +161,10 @@ def _read_options(options: argparse.Namespace) -> dict[str, Any]:
         columns[name.strip()] = (
             int(column) if column.isdecimal() and column.isascii() else column.strip()
         )
-    names = (
-        "unit",
-        "scale",
-        "frame_rate",
-        "tz",
-        "file_format",
-        "max_gap",
-        "max_rejected",
-    )
-    given = {
-        "columns": columns or None,
-        **{name: getattr(options, name) for name in names},
-    }
-    return {name: value for name, value in given.items() if value is not None}
+    known = {each.name for each in fields(Recipe)} - {"columns", "area"}
+    given = {name: getattr(options, name) for name in known}
+    recipe = Recipe.load(options.recipe) if options.recipe else None
+    return find_recipe(files, recipe, columns=columns or None, **given).as_json()
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -200,7 +199,7 @@ def _run(options: argparse.Namespace) -> int:
         parameters["area"] = options.area
     if options.walls:
         parameters["has_walls"] = True
-    if reading := _read_options(options):
+    if reading := _read_options(options, options.data):
         parameters["reading"] = reading
     _require_workbook_packages()
     from .runner import run
@@ -286,16 +285,16 @@ def _inspect(options: argparse.Namespace) -> int:
     from ..encounters.settings import EncounterSettings
     from ..tracks import datasets, funnels
     from ..tracks.clock import read_tracks
-    from ..tracks.options import ReadOptions, arguments
-    from ..tracks.quality import describe_file
+    from ..tracks.quality import describe_file, find_reading
+    from ..tracks.recipe import FILE_NAME, Recipe, arguments
 
     files = datasets.find([options.file])
     if len(files) != 1:
         raise DataError(
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
+    reading = Recipe(**_read_options(options, options.file))
     advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
-    reading = ReadOptions(**_read_options(options))
     print(describe_file(files[0], reading))
     with warnings.catch_warnings(
         action="ignore", category=DataWarning
@@ -303,7 +302,7 @@ def _inspect(options: argparse.Namespace) -> int:
         samples = find_encounters_in_files(files, settings, reading)
         if "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS:
             advice = relax_conditions(
-                samples, read_tracks(files, options=reading), settings
+                samples, read_tracks(files, recipe=reading), settings
             )
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
@@ -312,6 +311,27 @@ def _inspect(options: argparse.Namespace) -> int:
     print(funnels.text(funnels.get(samples)))
     if advice:
         print(advice)
+    if options.save is not None:
+        found = find_reading(files[0], reading)
+        if "area" in samples.attrs:
+            found = replace(found, area=samples.attrs["area"])
+        print(
+            "recipe saved:",
+            printable(found.save(options.save or files[0].with_name(FILE_NAME))),
+        )
+        reading = Recipe.load(options.save) if options.save else Recipe()
+        print(
+            "go on with:",
+            shlex.join(
+                [
+                    "szlib",
+                    "fit",
+                    options.file,
+                    *(["--recipe", options.save] if options.save else []),
+                ]
+            ),
+        )
+        return 0
     words = [
         "szlib",
         "run",
@@ -331,12 +351,12 @@ def _extract(options: argparse.Namespace) -> int:
     """Extract the encounters of many days, and print the table of days."""
     from ..core.parallel import cluster
     from ..encounters.days import extract_days
-    from ..tracks.options import ReadOptions
+    from ..tracks.recipe import Recipe
 
     with cluster(options.scheduler, wait=options.wait):
         extraction = extract_days(
             options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude,
-            options=ReadOptions(**_read_options(options)), area=options.area, has_walls=options.walls,
+            recipe=Recipe(**_read_options(options, options.data)), area=options.area, has_walls=options.walls,
         )  # fmt: skip
     print(extraction)
     return 1 if len(extraction.failed) else 0
@@ -345,7 +365,7 @@ def _extract(options: argparse.Namespace) -> int:
 def _fit(options: argparse.Namespace) -> int:
     """Fit a zone to extracted days or tracks."""
     from ..encounters.settings import EncounterSettings
-    from ..tracks.options import ReadOptions
+    from ..tracks.recipe import Recipe
     from .fit_command import fit
 
     given = {
@@ -353,7 +373,13 @@ def _fit(options: argparse.Namespace) -> int:
         for name in ("out", "method", "kind", "tracks", "exclude", "jobs")
     }
     given["settings"] = EncounterSettings(area=options.area, has_walls=options.walls)
-    print(fit(options.data, reading=ReadOptions(**_read_options(options)), **given))
+    print(
+        fit(
+            options.data,
+            reading=Recipe(**_read_options(options, options.data)),
+            **given,
+        )
+    )
     return 0
 
 

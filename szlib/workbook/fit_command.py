@@ -25,7 +25,7 @@ from ..encounters.one_day import (
 from ..encounters.settings import EncounterSettings
 from ..tracks import datasets
 from ..tracks.clock import read_tracks
-from ..tracks.options import ReadOptions
+from ..tracks.recipe import Recipe
 from ..zones.outliers import R_MAX
 from ..zones.social_zone import SocialZone
 from ..zones.uncertainty import N_RESAMPLES
@@ -47,7 +47,7 @@ def fit(
     *,
     out: str | Path,
     settings: EncounterSettings,
-    reading: ReadOptions,
+    reading: Recipe,
     method: str | None = None,
     kind: Sequence[str] | None = None,
     tracks: Sequence[str] = (),
@@ -81,7 +81,7 @@ def fit(
                 f"{' '.join(paths)}: give one folder of extracted days, or files of tracks"
             )
         days = Extraction.load(paths[0], exclude=exclude)
-        samples, settings, reading = days.samples(), days.settings, days.options
+        samples, settings, reading = days.samples(), days.settings, days.recipe
         of_days = [
             list(content)
             for source in days.sources.values()
@@ -94,7 +94,7 @@ def fit(
             raise DataError(
                 f"{printable(other[0])}: is none of the files of the extracted days, unchanged"
             )
-        table = read_tracks(files, options=reading) if files else None
+        table = read_tracks(files, recipe=reading) if files else None
     else:
         for name in [
             name for name, given in (("tracks", tracks), ("exclude", exclude)) if given
@@ -104,7 +104,7 @@ def fit(
             )
         files = datasets.find(paths)
         settings = replace(settings, area=known_area(settings, files, reading) or AUTO)
-        table = read_tracks(files, options=reading)
+        table = read_tracks(files, recipe=reading)
         samples = find_encounters(table, settings=settings)
         is_small = (
             "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS

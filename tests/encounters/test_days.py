@@ -290,7 +290,7 @@ def test_day_without_encounters_gives_an_empty_table(
     [
         ({"speed": 1}, "unknown parameter"),
         ({"tz": "Mars"}, "unknown time zone 'Mars'"),
-        ({"unit": "yd"}, "unit must be one of"),
+        ({"unit": "ell"}, "unit must be one of"),
         ({"file_format": "csv"}, "file_format must be .*; got 'csv'"),
     ],
 )
@@ -454,7 +454,7 @@ def test_extraction_is_loaded_from_its_folder(days: list[Path], tmp_path: Path) 
     pd.testing.assert_frame_equal(loaded.samples(), made.samples(), check_exact=True)
     assert list(loaded.table["day"]) == list(DATES) and loaded.area == made.area
     assert loaded.settings == szlib.EncounterSettings(area=made.area, min_speed=0.5)
-    assert loaded.options == szlib.ReadOptions(max_gap=0.7)
+    assert loaded.recipe == szlib.Recipe(max_gap=0.7)
     some = szlib.Extraction.load(tmp_path / "out", exclude=DATES[:3])
     assert set(some.samples()["day"]) == {DATES[3]}
 

@@ -24,8 +24,7 @@ from szlib.encounters.near_rows import read_near_area
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
-from szlib.tracks.formats import open_file
-from szlib.tracks.readers import read_raw
+from szlib.tracks.readers import open_file, read_raw
 
 SETTINGS = [
     (szlib.ATC_SQUARE, 3.0, None),
@@ -152,8 +151,8 @@ def test_damaged_rows_are_rejected_as_by_read_raw(
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
-    with open_file(path, szlib.ReadOptions()) as (layout, scan, _):
-        found = blocks.UsableBlocks(scan, layout)
+    with open_file(path, szlib.Recipe()) as (_, scan):
+        found = blocks.UsableBlocks(scan)
         rows = pl.concat(found)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)
@@ -162,7 +161,7 @@ def test_damaged_rows_are_rejected_as_by_read_raw(
     assert (found.n_usable, dict(found.reasons)) == (read["kept"], read["rejected"])
     assert found.first_fault is None or found.first_fault[0] == 31
     np.testing.assert_array_equal(rows["id"], whole["id"])
-    np.testing.assert_array_equal(rows["y"] * layout.metres, whole["y"])
+    np.testing.assert_array_equal(rows["y"], whole["y"])
 
 
 def test_area_without_people_gives_an_empty_table(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pandas as pd
 
+from .track_files import BEGIN as ATC_BEGIN
 from .track_files import as_1hz, as_ewap, as_raw
 
 RATE, INTERVAL = 25, 10  # frames a second, and frames between two samples: 0.4 s
@@ -195,7 +196,7 @@ TEXTS: dict[str, Callable[[], str]] = {
     "magni.csv": _magni,
     "obsmat.txt": lambda: as_ewap(hall(), rate=RATE),
     "atc-raw.csv": lambda: as_raw(hall().assign(**_SINCE_1970)),
-    "atc-1hz.csv": lambda: as_1hz(hall().assign(**_SINCE_1970)),
+    "atc-1hz.csv": lambda: as_1hz(hall().assign(t=lambda r: ATC_BEGIN + r["t"])),
 }
 BINARIES: dict[str, Callable[[Path], object]] = {
     "packed.csv.gz": lambda path: path.write_bytes(gzip.compress(_table().encode())),

@@ -60,7 +60,7 @@ def assert_streamed_as_whole(
 ) -> int:
     """Check that both ways agree to the last bit, and return the number of samples."""
     near = read_near_area(
-        path, area=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap)
+        path, area=square, duration=duration, recipe=szlib.Recipe(max_gap=max_gap)
     )
     given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
     streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)

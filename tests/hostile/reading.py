@@ -10,10 +10,12 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import random
 import sqlite3
 import tempfile
 import warnings
+import zipfile
 from collections import Counter
 from collections.abc import Callable
 from contextlib import closing
@@ -42,7 +44,7 @@ def attack(long: bool) -> Counter[str]:
     """Read the files, and count the outcomes."""
     tally = Counter(dict.fromkeys(("read", "refused", "broken: wrong in silence"), 0))
     with tempfile.TemporaryDirectory() as folder:
-        for seed in range(FILES[long]):
+        for seed in range(int(os.environ.get("SZLIB_FILES", FILES[long]))):
             outcome = read(Path(folder), seed)
             tally[outcome] += 1
             if outcome.startswith("broken"):
@@ -113,12 +115,15 @@ def read(folder: Path, seed: int) -> str:
     ):
         table = table.sample(frac=1, random_state=seed)
     path = WRITERS[draw.choice(list(WRITERS))](table, folder, draw)
+    options |= draw.choice(({}, {}, {"area": "0 12 0 8"}))
     with warnings.catch_warnings(record=True):
         warnings.simplefilter("always")
         try:
-            found = read_raw(path, options=szlib.ReadOptions(**options))
+            found = read_raw(path, recipe=szlib.Recipe(**options))
         except szlib.SzlibError:
             return "refused"
+    if found.attrs.get("area") != options.get("area"):
+        return "broken: another area"
     return judge(found, truth, table.index.to_numpy())
 
 
@@ -166,7 +171,9 @@ def write_text(table: pd.DataFrame, folder: Path, draw: random.Random) -> Path:
     if separator == " " and draw.random() < 0.5:
         lines = [line.replace(" ", "   ") for line in lines]
     path = folder / f"hall.{draw.choice(('csv', 'txt'))}"
-    path.write_bytes(end.join([*lines, ""]).encode(draw.choice(("utf-8", "utf-8-sig"))))
+    path.write_bytes(
+        end.join([*lines, ""]).encode(draw.choice(("utf-8", "utf-8-sig", "utf-16")))
+    )
     return path
 
 
@@ -204,11 +211,43 @@ def write_sqlite(table: pd.DataFrame, folder: Path, draw: random.Random) -> Path
     return path
 
 
-def write_lines(table: pd.DataFrame, folder: Path, draw: random.Random) -> Path:
-    """As JSON lines, which are no table: to be refused."""
-    path = folder / "hall.jsonl"
+def write_json(table: pd.DataFrame, folder: Path, draw: random.Random) -> Path:
+    """As JSON lines, or as a list of objects."""
+    path = folder / "hall.json"
     rows = table.astype(object).to_dict("records")
-    path.write_text("\n".join(json.dumps(row, default=str) for row in rows))
+    texts = [json.dumps(row, default=lambda value: value.item()) for row in rows]
+    is_list = draw.random() < 0.5
+    path.write_text(f"[{', '.join(texts)}]" if is_list else "\n".join(texts))
+    return path
+
+
+def write_fixed_width(table: pd.DataFrame, folder: Path, draw: random.Random) -> Path:
+    """Columns of a fixed width, perhaps with blank fields."""
+    path = folder / "hall.txt"
+    texts = table.astype(str)
+    if draw.random() < 0.5:
+        at = draw.sample(range(len(table)), len(table) // draw.choice((200, 40, 10)))
+        texts.iloc[at, draw.randrange(texts.shape[1])] = ""
+    path.write_text(texts.to_string(index=False))
+    return path
+
+
+def write_zip(table: pd.DataFrame, folder: Path, draw: random.Random) -> Path:
+    """A text in a zip archive, sometimes beside another file."""
+    plain, path = write_text(table, folder, draw), folder / "hall.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.write(plain, "data/hall.csv")
+        if draw.random() < 0.2:
+            archive.writestr("readme.txt", "people")
+    return path
+
+
+def write_sheet(table: pd.DataFrame, folder: Path, draw: random.Random) -> Path:
+    """What Excel writes: to be refused with a command."""
+    path = folder / "hall.xlsx"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+        archive.writestr("xl/worksheets/sheet1.xml", table.to_html())
     return path
 
 
@@ -217,5 +256,8 @@ WRITERS = {
     "csv": write_text,
     "parquet": write_parquet,
     "sqlite": write_sqlite,
-    "lines": write_lines,
+    "json": write_json,
+    "fixed width": write_fixed_width,
+    "zip": write_zip,
+    "sheet": write_sheet,
 }

@@ -153,7 +153,7 @@ def test_a_frame_rate_is_refused_where_times_are_in_seconds(tmp_path: Path) -> N
     (tmp_path / "tidy.csv").write_text("t,id,x,y\n0,1,0,0\n0.1,1,1,0\n")
     with pytest.raises(
         szlib.DataError,
-        match="is tidy, whose times are in seconds; leave frame_rate out",
+        match="its times are in seconds; leave frame_rate out",
     ):
         szlib.read_tracks(tmp_path / "tidy.csv", frame_rate=25)
     for wrong in (0, -15, float("nan"), 1e10):
@@ -173,7 +173,7 @@ def test_quality_and_encounters_use_the_estimated_frame_rate(tmp_path: Path) -> 
     square = szlib.Square(x=(-50, 50), y=(-50, 50))
     settings = szlib.EncounterSettings(area=square, min_distance=0.0)
     whole = szlib.find_encounters(szlib.read_tracks(file), settings=settings)
-    for options in (szlib.ReadOptions(), szlib.ReadOptions(frame_rate=25)):
+    for options in (szlib.Recipe(), szlib.Recipe(frame_rate=25)):
         pd.testing.assert_frame_equal(
             find_encounters_in_files([file], settings, options), whole
         )

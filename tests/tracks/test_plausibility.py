@@ -49,10 +49,10 @@ SPOILED = {
         x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2
     ),
     "feet: pass unit='ft'": lambda: walkers(1.0 / 0.3048),
-    "milliseconds: pass columns={'frame': 't'} and frame_rate=1000": lambda: (
-        table().assign(t=lambda t: t["t"] * 1e3)
+    "milliseconds: pass time_unit='ms'": lambda: table().assign(
+        t=lambda t: t["t"] * 1e3
     ),
-    "numbers of frames: pass columns={'frame': 't'} and frame_rate=25": frames,
+    "25 is only a guess: pass columns={'frame': 't'} and frame_rate=25": frames,
     "longitude and latitude": lambda: table().assign(
         x=lambda t: 135.5 + t["x"] / 90_000, y=lambda t: 34.7 + t["y"] / 111_000
     ),
@@ -86,7 +86,7 @@ def test_the_suggested_options_give_the_right_table(message: str) -> None:
     advice = re.search(r"pass (unit|columns)=('\w+'|\{.*?\})", str(error.value))
     options = {advice[1]: eval(advice[2])}
     pd.testing.assert_frame_equal(
-        read_raw(SPOILED[message](), options=szlib.ReadOptions(**options)),
+        read_raw(SPOILED[message](), recipe=szlib.Recipe(**options)),
         read_raw(table()),
     )
 
@@ -106,7 +106,7 @@ def test_implausible_files_are_refused_like_tables(tmp_path: Path) -> None:
         read_raw(tmp_path / "hall.csv")
     without = tmp_path / "public.csv"
     spoiled.assign(v=1.0, a=0.1).to_csv(without, index=False, header=False)
-    with pytest.raises(szlib.DataError, match="pass unit='cm'"):
+    with pytest.raises(szlib.DataError, match="'x': 2, 'y': 3} and unit='cm'"):
         read_raw(without)
 
 
@@ -115,7 +115,7 @@ def test_only_formats_that_leave_doubt_get_a_suggestion(tmp_path: Path) -> None:
     spoiled = table().assign(t=lambda t: (t["t"] + 1.7e9) * 1e3, v=1.0, a=0.1)
     spoiled.to_csv(tmp_path / "public.csv", index=False, header=False)
     with pytest.raises(
-        szlib.DataError, match="as atc-1hz; times look like milliseconds: pass columns="
+        szlib.DataError, match=r"pass columns=\{'t': 0, 'id': 1, 'x': 2, 'y': 3\}$"
     ):
         read_raw(tmp_path / "public.csv")
     raw = spoiled.assign(x=1e3 * spoiled["x"], y=1e3 * spoiled["y"], b=0.0, c=0.0)
@@ -129,11 +129,11 @@ def test_exchanged_columns_of_a_file_without_header_are_named_by_number(
 ) -> None:
     wrong = table().assign(v=1.0, a=0.1)[["id", "t", "x", "y", "v", "a"]]
     wrong.to_csv(tmp_path / "a.csv", index=False, header=False)
-    with pytest.raises(szlib.DataError, match="columns look exchanged") as error:
+    with pytest.raises(szlib.DataError, match="people walk if these are") as error:
         read_raw(tmp_path / "a.csv")
     columns = eval(re.search(r"columns=(\{.*?\})", str(error.value))[1])
     assert columns == {"t": 1, "id": 0, "x": 2, "y": 3}
-    read = read_raw(tmp_path / "a.csv", options=szlib.ReadOptions(columns=columns))
+    read = read_raw(tmp_path / "a.csv", recipe=szlib.Recipe(columns=columns))
     pd.testing.assert_frame_equal(
         read.drop(columns="day"), read_raw(table()).drop(columns="day")
     )
@@ -142,9 +142,7 @@ def test_exchanged_columns_of_a_file_without_header_are_named_by_number(
 def test_an_implausible_given_unit_warns() -> None:
     spoiled = SPOILED["centimetres: pass unit='cm'"]()
     with pytest.warns(szlib.DataWarning, match="people move at"):
-        assert len(read_raw(spoiled, options=szlib.ReadOptions(unit="m"))) == len(
-            spoiled
-        )
+        assert len(read_raw(spoiled, recipe=szlib.Recipe(unit="m"))) == len(spoiled)
 
 
 def test_pixels_get_no_advice_that_makes_people_slow() -> None:
@@ -156,7 +154,7 @@ def test_pixels_get_no_advice_that_makes_people_slow() -> None:
     with pytest.warns(
         szlib.DataWarning, match=r"the median of their speed is 0\.3\d m/s"
     ):
-        read_raw(walkers(38.0), options=szlib.ReadOptions(unit="cm"))
+        read_raw(walkers(38.0), recipe=szlib.Recipe(unit="cm"))
 
 
 @pytest.mark.parametrize(

@@ -33,8 +33,8 @@ from helpers.track_tables import real_data
 import szlib
 from szlib.encounters.near_rows import read_near_area
 from szlib.tracks import funnels
-from szlib.tracks.formats import FORMATS
 from szlib.tracks.readers import read_raw
+from szlib.tracks.shapes import SHAPES
 
 
 def scaled(factor: float) -> pd.DataFrame:
@@ -89,7 +89,7 @@ def test_every_format_gives_the_same_table(
         == stage_of(frame, "merge")["kept"]
     )
     assert frame.attrs["max_gap"] == (
-        pytest.approx(0.9) if name == "ewap" else FORMATS[name].max_gap
+        pytest.approx(0.9) if name == "ewap" else SHAPES[name].recipe.max_gap
     )
 
 
@@ -178,19 +178,14 @@ def test_the_day_of_the_mall_is_the_date_in_tokyo_of_others_in_utc(
     )
     frame = read_raw(path)
     assert frame["day"].astype(str).tolist() == ["2012-10-24"] * 2 + ["2012-10-25"] * 2
-    assert set(read_raw(path, options=szlib.ReadOptions(tz="UTC"))["day"]) == {
-        "2012-10-24"
-    }
+    assert set(read_raw(path, recipe=szlib.Recipe(tz="UTC"))["day"]) == {"2012-10-24"}
     table = write(
         tmp_path / "hall.csv", as_tidy(samples(people=1, count=4, begin=midnight - 0.8))
     )
     assert set(read_raw(table)["day"]) == {"2012-10-24"}
-    assert (
-        read_raw(table, options=szlib.ReadOptions(tz="Asia/Tokyo"))["day"].nunique()
-        == 2
-    )
+    assert read_raw(table, recipe=szlib.Recipe(tz="Asia/Tokyo"))["day"].nunique() == 2
     with pytest.raises(szlib.DataError, match="unknown time zone 'Mars/Olympus'"):
-        read_raw(path, options=szlib.ReadOptions(tz="Mars/Olympus"))
+        read_raw(path, recipe=szlib.Recipe(tz="Mars/Olympus"))
 
 
 def test_excluded_days_are_left_out_and_counted(tmp_path: Path) -> None:
@@ -304,9 +299,9 @@ def test_a_file_with_more_than_a_twentieth_of_bad_rows_is_refused(
     ):
         read_raw(path)
     with pytest.warns(szlib.DataWarning, match="3 x missing"):
-        assert len(read_raw(path, options=szlib.ReadOptions(max_rejected=0.06))) == 56
+        assert len(read_raw(path, recipe=szlib.Recipe(max_rejected=0.06))) == 56
     with pytest.raises(szlib.DataError, match="max_rejected must be from 0 to 1"):
-        szlib.ReadOptions(max_rejected=2)
+        szlib.Recipe(max_rejected=2)
 
 
 def test_rows_without_a_day_are_rejected(tmp_path: Path) -> None:
@@ -371,7 +366,7 @@ UNUSABLE: dict[str, tuple[str | bytes, str]] = {
     "a column twice": ("t,id,x,y,x\n1,2,3,4,5\n", "names x twice"),
     "no header": (TIDY_ROWS, "has no column t, id, x, y"),
     "semicolons": (as_1hz(samples()).replace(",", ";"), "line 1"),
-    "milliseconds": (as_1hz(samples()).replace(".", ""), "line 1: time not in seconds since 1970"),
+    "milliseconds": (as_1hz(samples()).replace(".", ""), "has no column t, id, x, y"),
     "days since 1970": ("t,id,x,y\n15637000000,7,5,5\n", "line 2: time not in seconds since 1970"),
     "places as names": ("t,id,x,y\n1,1,door,5\n2,1,5,6\n3,1,in,\n", "a number (column 'x' holds 'door')"),
     "metres in a raw file": (as_raw(scaled(1e-3)), "if they are metres, pass unit='m'; if the site"),
@@ -380,10 +375,10 @@ UNUSABLE: dict[str, tuple[str | bytes, str]] = {
     "millimetres, tidy": (as_tidy(scaled(1e3)), "unit='mm'"),
     "PNG": (PNG + bytes(range(256)) * 9, "line 1"),
     "HTML": ("<!doctype html>\n<html><body>404</body></html>\n", "line 1"),
-    "JSON": ('{"t": 1, "id": 2, "x": 3, "y": 4}\n', "line 1"),
+    "JSON": ('{"t": 1, "id": 2, "x": 3}\n', "has no column y"),
     "zeros": (bytes(5000), "line 1"),
     "random bytes": (random.Random(1).randbytes(5000), "line 1"),
-    "UTF-16": (as_tidy(samples()).encode("utf-16"), "line 1"),
+    "UTF-16": (as_raw(samples()).encode("utf-16")[:99], "line 1"),
     "one endless line": (b"1," * 300_000, "line 1"),
     "a truncated .gz": (gzip.compress(as_raw(samples()).encode())[:-30], "damaged .gz"),
     "a corrupt .gz": (gzip.compress(b"1,2\n" * 99)[:-8] + b"\x00" * 8, "damaged .gz"),
@@ -408,11 +403,22 @@ def test_an_unusable_file_is_refused_with_its_name_and_the_reason(
     assert len(str(error.value)) < 1000
 
 
-def test_a_zip_file_is_refused(tmp_path: Path) -> None:
+def test_one_file_in_a_zip_archive_is_read_several_are_refused(tmp_path: Path) -> None:
+    plain = read_raw(write(tmp_path / "a.csv", as_raw(samples())))
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
-        archive.writestr("a.csv", as_raw(samples()))
-    with pytest.raises(szlib.DataError, match=r"a\.zip, line 1"):
+        archive.writestr("folder/b.csv", as_raw(samples()))
+    pd.testing.assert_frame_equal(read_raw(tmp_path / "a.zip"), plain)
+    with zipfile.ZipFile(tmp_path / "a.zip", "a") as archive:
+        archive.writestr("c.csv", as_raw(samples()))
+    with pytest.raises(szlib.DataError, match=r"a\.zip, line 1: .* holds 2 files; unp"):
         read_raw(tmp_path / "a.zip")
+
+
+def test_utf_16_is_read(tmp_path: Path) -> None:
+    plain = read_raw(write(tmp_path / "a.csv", as_tidy(samples())))
+    for encoding in ("utf-16", "utf-8-sig"):
+        path = write(tmp_path / "a.csv", as_tidy(samples()).encode(encoding))
+        pd.testing.assert_frame_equal(read_raw(path), plain)
 
 
 @pytest.mark.parametrize("cut", [0.2, 0.6, 0.95])
@@ -429,7 +435,7 @@ def test_parquet_columns_of_wrong_type_are_refused(tmp_path: Path) -> None:
         "no column y": rows.drop(columns="y"),
         "time not in seconds": rows.assign(t=[datetime.time(9, 30)] * len(rows)),
         "not a number": rows.assign(x="p" + rows["x"].astype(str)),
-        "cannot be read as tidy": rows.assign(x=[[1.0, 2.0]] * len(rows)),
+        "cannot be used as tidy": rows.assign(x=[[1.0, 2.0]] * len(rows)),
     }.items():
         table.to_parquet(tmp_path / "a.parquet")
         with pytest.raises(szlib.DataError, match=rf"a\.parquet.*{message}"):
@@ -454,8 +460,8 @@ def test_parquet_times_with_a_type_are_read_in_seconds(
 ) -> None:
     rows = samples(begin=BEGIN)
     rows.assign(t=times(rows["t"])).to_parquet(tmp_path / "a.parquet")
-    japan = szlib.ReadOptions(tz="Asia/Tokyo")
-    read, expected = read_raw(tmp_path / "a.parquet", options=japan), read_raw(rows)
+    japan = szlib.Recipe(tz="Asia/Tokyo")
+    read, expected = read_raw(tmp_path / "a.parquet", recipe=japan), read_raw(rows)
     np.testing.assert_allclose(read["t"], expected["t"], rtol=0, atol=1e-6)
     assert list(read["id"]) == list(expected["id"])
 
@@ -485,9 +491,9 @@ def test_people_whose_ids_are_too_large_for_floats_stay_two(
             line.replace("9007199254740992", "9007199254740993") for line in lines[-20:]
         ]
         source = write(tmp_path / "a.csv", "".join(lines))
-    options = szlib.ReadOptions(frame_rate=15 if name == "ewap" else None)
-    assert set(read_raw(source, options=options)["id"]) == {LARGE_ID, LARGE_ID + 1}
-    tracks = szlib.read_tracks(source, options=options)
+    options = szlib.Recipe(frame_rate=15 if name == "ewap" else None)
+    assert set(read_raw(source, recipe=options)["id"]) == {LARGE_ID, LARGE_ID + 1}
+    tracks = szlib.read_tracks(source, recipe=options)
     assert tracks.groupby("id")["y"].std().max() < 1e-9, "each walks straight ahead"
 
 
@@ -552,13 +558,13 @@ def test_missing_files_folders_and_locked_files_are_refused(
 def test_unknown_options_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", as_raw(samples()))
     with pytest.raises(szlib.DataError, match=r"file_format must be .*; got 'csv'"):
-        read_raw(path, options=szlib.ReadOptions(file_format="csv"))
-    with pytest.raises(szlib.DataError, match=r"unit must be one of .*; got 'yd'"):
-        read_raw(path, options=szlib.ReadOptions(unit="yd"))
+        read_raw(path, recipe=szlib.Recipe(file_format="csv"))
+    with pytest.raises(szlib.DataError, match=r"unit must be one of .*; got 'ell'"):
+        read_raw(path, recipe=szlib.Recipe(unit="ell"))
     with pytest.raises(
         szlib.DataError, match=r"a\.csv, line 1: missing or extra fields; 60 of 60 rows"
     ):
-        read_raw(path, options=szlib.ReadOptions(file_format="atc-1hz"))
+        read_raw(path, recipe=szlib.Recipe(file_format="atc-1hz"))
 
 
 def test_a_given_unit_converts_positions(tmp_path: Path) -> None:
@@ -566,12 +572,12 @@ def test_a_given_unit_converts_positions(tmp_path: Path) -> None:
     millimetres = read_raw(write(tmp_path / "a.csv", as_raw(rows)))
     in_metres = read_raw(
         write(tmp_path / "a.csv", as_raw(scaled(1e-3))),
-        options=szlib.ReadOptions(unit="m"),
+        recipe=szlib.Recipe(unit="m"),
     )
     pd.testing.assert_frame_equal(in_metres, millimetres, rtol=0, atol=2e-6)
     wide = read_raw(
         write(tmp_path / "a.csv", as_1hz(scaled(1e3))),
-        options=szlib.ReadOptions(unit="mm"),
+        recipe=szlib.Recipe(unit="mm"),
     )
     pd.testing.assert_frame_equal(wide, millimetres, rtol=0, atol=2e-6)
 

@@ -241,10 +241,10 @@ def test_notebook_without_disk_space_is_refused_with_exit_code_2(
         ({"fraction": 0.9}, "fraction: expected 1e-06 to 0.5"),
         ({"n_jobs": 0}, "n_jobs"),
         ({"results": "x"}, "use the option --out"),
-        ({"reading": "mm"}, "reading: expected options of szlib.ReadOptions"),
+        ({"reading": "mm"}, "reading: expected options of szlib.Recipe"),
         (
             {"reading": {"units": "mm"}},
-            "reading: expected options of szlib.ReadOptions",
+            "reading: expected options of szlib.Recipe",
         ),
         ({"reading": {"unit": "inch"}}, "unit must be one of"),
     ],

@@ -98,7 +98,7 @@ class DataCache:
         settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
             options = self.method.read_options()
-            tracks = read_tracks(files, options=options)
+            tracks = read_tracks(files, recipe=options)
             return (
                 tracks
                 if one_day.known_area(settings, files, options)

@@ -16,7 +16,7 @@ from ...core.input_files import printable
 from ...encounters.areas import AUTO, as_area
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.settings import EncounterSettings
-from ...tracks.options import ReadOptions
+from ...tracks.recipe import Recipe
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
@@ -45,7 +45,7 @@ class ZoneMethod:
     ----------
     space_width, space_length : size of the attentional space [m] (notebook 02).
     duration, min_distance, min_speed : conditions of an encounter [s, m, m/s] (notebook 02).
-    reading : how the files of the data are read: options of `szlib.ReadOptions` by name (notebook 01).
+    reading : how the files of the data are read: options of `szlib.Recipe` by name (notebook 01).
     has_walls : whether the outline of the area is a wall, beyond which the space may reach (notebook 02).
     r_max : distance up to which samples count [m] (notebook 03).
     q : fraction of encounters that may enter the quantile zone (notebook 05).
@@ -80,12 +80,12 @@ class ZoneMethod:
             }
         )
 
-    def read_options(self) -> ReadOptions:
+    def read_options(self) -> Recipe:
         """Options of `szlib.read_tracks`; raises DataError where `reading` holds something else."""
         try:
-            return ReadOptions(**self.reading)
+            return Recipe(**self.reading)
         except TypeError as error:
-            expected = 'options of szlib.ReadOptions by name, such as {"unit": "mm"}'
+            expected = 'options of szlib.Recipe by name, such as {"unit": "mm"}'
             raise DataError(
                 f"parameter reading: expected {expected}; got {self.reading!a:.80}"
             ) from error

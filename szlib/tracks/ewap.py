@@ -6,17 +6,17 @@ columns: displacement per frame against velocity.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 import polars as pl
 
-from ...core.errors import DataError, warn
-from ..options import FRAME_RATES, ReadOptions
-from .base import TrackFormat, decode_first_line
+from ..core.errors import DataError, warn
 
+FRAME_RATES = (
+    1.0,
+    240.0,
+)  # lowest and highest number of frames a second that a video can have
 # Sampling intervals without a sample after which a track ends: 0.9 s where samples are 0.4 s apart.
 _GAP = 2.25
 # frames a second of EWAP files: ETH 15; hotel, zara and students 25
@@ -28,30 +28,10 @@ _FARTHEST_NUMBER = 1e12  # larger numbers are damage
 _STEP = 0.02  # shorter steps [m] are ignored
 
 
-@dataclass(frozen=True)
-class _Ewap(TrackFormat):
-    """Rows of 8 numbers: frame, id, x, z, y [m], vx, vz, vy [m/s]; z is the height."""
-
-    def open(
-        self, plain: Path, path: Path, head: bytes, options: ReadOptions
-    ) -> tuple[Self, pl.LazyFrame]:
-        """As `TrackFormat.open`; the frame rate is the one given, or estimated from the velocities."""
-        decode_first_line(head, path)
-        rows = self.scan(plain).collect()
-        seconds, max_gap = measure_frames(
-            rows.with_columns(id="exact_id"), path, options.frame_rate
-        )
-        return replace(self, seconds=seconds, max_gap=max_gap), rows.lazy()
-
-
-_COLUMNS = {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
-EWAP = _Ewap("ewap", 8, _COLUMNS, separator=" ", is_sequence=True)
-
-
 def measure_frames(
     rows: pl.DataFrame, path: Path, given: float | None
 ) -> tuple[float, float | None]:
-    """Duration of a frame, and of the longest gap within a track [s], which follows the sampling interval.
+    """The frame rate [1/s], and the longest gap within a track [s], which follows the sampling interval.
 
     `rows` of file `path` have id, t [frames], x, y, and vx, vy in the same unit of length a second.  `given`
     is the frame rate; None estimates it.  Raises DataError where the velocities give no rate.
@@ -82,7 +62,7 @@ def measure_frames(
     frames = rows.select(pl.col("t").diff().over("id"))["t"].drop_nulls()
     interval = frames.filter(frames > 0).median()
     gap = _GAP * float(interval) / rate if isinstance(interval, float | int) else None
-    return 1 / rate, gap
+    return rate, gap
 
 
 def estimate_frame_rate(rows: pl.DataFrame) -> tuple[float | None, str]:

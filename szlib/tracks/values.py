@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 import polars as pl
 
-from ...core.errors import DataError
+from ..core.errors import DataError
+from .recipe import TIME_UNITS
 
 # Times without a unit that are larger than this are counts since 1970, in units of so many seconds: as
 # seconds they would be later than the year 5000.
@@ -18,6 +19,7 @@ _SINCE_1970 = {
 }
 _DATE = r"^(?:19|20)\d{2}-\d{2}-\d{2}"  # beginning of an ISO time
 _ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
+_EXCEL_1970 = 25_569  # number of the day 1970-01-01 in Excel
 _SHORT = 11  # bits of a hash that are left out: a float holds the others exactly
 
 
@@ -43,7 +45,10 @@ def to_numbers(values: pl.Series, decimal: str = ".") -> pl.Series:
         values = (
             values.str.replace(",", ".", literal=True) if decimal == "," else values
         )
-    return values.cast(pl.Float64, strict=False)
+    try:
+        return values.cast(pl.Float64, strict=False)
+    except pl.exceptions.PolarsError:  # a list, an object
+        return pl.repeat(None, len(values), dtype=pl.Float64, eager=True)
 
 
 def to_times(values: pl.Series, tz: str, decimal: str = ".") -> Times:
@@ -116,7 +121,8 @@ def require_distinct_ids(ids: pl.Series, where: str) -> None:
         return
     known = pl.DataFrame({"text": ids.drop_nulls().unique().sort()})
     whole = pl.col("text").cast(pl.Int64, strict=False)
-    other = pl.col("text").cast(pl.Float64, strict=False).cast(pl.Int64, strict=False)
+    number = pl.col("text").cast(pl.Float64, strict=False)
+    other = pl.when(number == number.floor()).then(number).cast(pl.Int64, strict=False)
     number = pl.coalesce(whole, other)
     alike = known.with_columns(number=number).drop_nulls()
     alike = alike.filter(pl.col("number").is_duplicated()).sort("number", "text")
@@ -126,6 +132,25 @@ def require_distinct_ids(ids: pl.Series, where: str) -> None:
             f"{where}: the ids {one!r} and {other!r} are the same number; write them alike if they are one "
             f"person, else as names, such as 'p{one}' and 'p{other}'"
         )
+
+
+def scale_times(values: pl.Series, unit: str, tz: str, decimal: str = ".") -> Times:
+    """The times in a column of `values`, numbers with a point `decimal`, in a `unit` of time.
+
+    Days are those of Excel, in time zone `tz`.
+    """
+    numbers = to_numbers(values, decimal)
+    if unit != "days":
+        return Times(
+            numbers * TIME_UNITS[unit] if unit != "s" else numbers,
+            None,
+            f"times in {unit}",
+        )
+    milliseconds = (
+        ((numbers - _EXCEL_1970) * 86_400_000).round().cast(pl.Int64, strict=False)
+    )
+    local = milliseconds.cast(pl.Datetime("ms")).dt.cast_time_unit("ns").to_pandas()
+    return Times(_since_1970(_localize(local, tz)), None, f"days of Excel in {tz}")
 
 
 def _scale(numbers: pl.Series) -> Times:

@@ -1,0 +1,357 @@
+"""Which column of a table holds what: by the names given, by usual names, or by how people would walk."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import polars as pl
+
+from ..core.errors import DataError
+from .motion import find_walking
+from .recipe import DEGREES, PIXELS, UNITS, Recipe, advise
+from .sources import Source
+from .values import to_ids, to_numbers, to_times
+
+# Usual names of each quantity, without blanks, underscores and accents; the first one is taken before others.
+_USUAL = {
+    "t": "t time times timestamp timestamps datetime sec seconds zeit uhrzeit zeitstempel sekunden temps "
+    "horodatage secondes tiempo tempo tijd czas время 時刻 時間 时间 時間戳 시간",
+    "frame": "frame frames frameid framenumber frameno framenr frameindex bild bildnummer image trame "
+    "fotograma кадр フレーム フレーム番号 帧 프레임",
+    "id": "id pid ped pedid pedestrian pedestrianid person personid personnr agent agentid track trackid "
+    "traj trajid trajectory trajectoryid object objectid objid participant subject fußgänger fußgängerid "
+    "personne piéton identifiant persona peatón pessoa pedone человек 人 人物 人物id 歩行者 歩行者id "
+    "行人 行人id 보행자",
+    "x": "x posx xpos positionx xposition xcoord coordx xcoordinate centerx x座標 x坐标",
+    "y": "y posy ypos positiony yposition ycoord coordy ycoordinate centery y座標 y坐标",
+    "day": "day",
+}
+_GEOGRAPHIC = {"x": ("lon", "longitude", "lng"), "y": ("lat", "latitude")}
+_TIME_NAMES = {
+    "s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "ns": "ns", "days": "days",
+}  # fmt: skip
+_POSITION_NAMES = {
+    **{name: name for name in UNITS},
+    "px": PIXELS,
+    "pixel": PIXELS,
+    "pixels": PIXELS,
+}
+_POSITION_NAMES |= {"feet": "ft", "yards": "yd", "deg": DEGREES, "degrees": DEGREES}
+_RECORDINGS = frozenset({
+    "recording", "recordingid", "scene", "sceneid", "camera", "cameraid", "cam", "session", "sessionid",
+    "sequence", "sequenceid", "video", "videoid", "date", "run", "runid", "trial", "trialid", "experiment",
+    "clip", "place", "location", "locationid", "site", "dataset",
+})  # fmt: skip
+_CLOCK = re.compile(r"(time|sec|stamp|frame|zeit|hour|minute)")  # in names of times
+_LONGEST_SHARE = (
+    5  # people have so many rows under each value that tells recordings apart
+)
+_FRAMES = 25.0  # a usual frame rate [1/s], to find columns
+_LISTED = 40  # number of columns that are looked at
+_PIXEL = 0.02  # metres in a pixel that an error message shows as an example
+_GUESSED = 6  # number of columns that are tried out, as whose people walk
+_SAMPLE = 2000  # rows in which columns are guessed
+
+
+def find_columns(source: Source, recipe: Recipe) -> Recipe:
+    """Complete a `recipe` with the columns of a `source`, and with the units that their names state.
+
+    Raises
+    ------
+    DataError : a column is missing, doubled or ambiguous, frames have no rate, pixels no scale, degrees no
+        origin; it says which columns look like what.
+    """
+    names, where = source.names, source.where + source.head
+    given, keys = dict(recipe.columns or {}), [_split_unit(name) for name in names]
+    for k in given.values():
+        if isinstance(k, int) and not 0 <= k < len(names):
+            raise DataError(
+                f"{where} has no field {k}; it has {len(names)}, the first is 0"
+            )
+    given |= {} if {"t", "frame"} & given.keys() else _find_sums(source, keys)
+    at = {quantity: _candidates(quantity, given, names, keys) for quantity in _USUAL}
+    is_free = "t" not in given and bool(at["frame"])
+    is_frame = "frame" in given or (
+        is_free and (not at["t"] or recipe.frame_rate is not None)
+    )
+    time = "frame" if is_frame else "t"
+    needed = [time, "id", "x", "y", *(["day"] if at["day"] else [])]
+    _require_clear(where, {quantity: at[quantity] for quantity in needed}, names, given)
+    found = given | {quantity: at[quantity][0] for quantity in needed if at[quantity]}
+    if missing := [quantity for quantity in needed if quantity not in found]:
+        lacking = ", ".join(str(given.get(quantity, quantity)) for quantity in missing)
+        raise DataError(
+            f"{where} has no column {lacking}; {_suggest(source, recipe, found, missing)}"
+        )
+    units = {keys[names.index(found[c])][1] if found[c] in names else "" for c in "xy"}
+    stated = {_POSITION_NAMES.get(unit) for unit in units}
+    if all(
+        found[c] in names and keys[names.index(found[c])][0] in _GEOGRAPHIC[c]
+        for c in "xy"
+    ):
+        stated = {DEGREES}
+    clock = keys[names.index(found["t"])][1] if found.get("t") in names else ""
+    recipe = Recipe(columns=found).over(recipe)
+    if not recipe.time_unit and clock in _TIME_NAMES:
+        recipe = replace(recipe, time_unit=_TIME_NAMES[clock])
+    if not (recipe.unit or recipe.has_places) and len(stated) == 1:
+        recipe = replace(recipe, unit=stated.pop())
+    _require_known(where, recipe)
+    return recipe
+
+
+def _require_clear(
+    where: str,
+    at: Mapping[str, Sequence[str | int]],
+    names: Sequence[str],
+    given: Mapping[str, str | int],
+) -> None:
+    """Raise DataError where several columns can hold one quantity, or a name is there twice."""
+    for quantity, found in at.items():
+        same = sorted(map(str, set(found)))
+        if len(same) > 1:
+            advice = advise(columns={**given, quantity: found[0]})
+            raise DataError(
+                f"{where}: {', '.join(same)} can all be {quantity}; {advice}"
+            )
+        if len(found) > 1:
+            raise DataError(f"{where} names {same[0]} twice; rename one of them")
+
+
+def _require_known(where: str, recipe: Recipe) -> None:
+    """Raise DataError where frames have no rate, times have one, or pixels no scale.
+
+    The rate of EWAP files follows from their velocities.
+    """
+    columns, guesses, missing = dict(recipe.columns or {}), dict[str, object](), []
+    if "t" in columns and recipe.frame_rate is not None:
+        raise DataError(
+            f"{where}: its times are in seconds; leave frame_rate out, or name the column that counts "
+            f"frames: {advise(columns={'frame': columns['t']})}"
+        )
+    if "frame" in columns and recipe.frame_rate is None and "vx" not in columns:
+        missing.append(
+            f"{columns['frame']!r} counts frames; pass frame_rate=, frames a second of the video"
+        )
+        guesses["frame_rate"] = _FRAMES
+    if recipe.unit == PIXELS and not recipe.has_places:
+        missing.append(
+            "positions are in pixels; pass scale=, metres in a pixel, or homography=, 3 x 3 numbers that map "
+            "pixels to the floor"
+        )
+        guesses["scale"] = _PIXEL
+    if missing:
+        numbers = " and ".join(f"{value:g}" for value in guesses.values())
+        verb = "are only guesses" if len(guesses) > 1 else "is only a guess"
+        raise DataError(
+            f"{where}: {'; '.join(missing)}; {numbers} {verb}: {advise(**guesses)}"
+        )
+
+
+def column_of(source: Source, at: str | int) -> pl.Series:
+    """The column of a `source` `at` a number or a name; or the sum of columns that it says, in SQL."""
+    if isinstance(at, int):
+        return source.column(at)
+    if at in source.names:
+        return source.column(source.names.index(at))
+    known = {name or f"f{k}": k for k, name in enumerate(source.names)}
+    try:
+        sum_ = pl.sql_expr(at)
+        roots = sum_.meta.root_names()
+        if not roots or not set(roots) <= known.keys():
+            raise DataError(
+                f"{source.where} has no column {at}; it has {list(known)[:12]}"
+            )
+        columns = {root: source.column(known[root]) for root in roots}
+        if "||" not in at and "'" not in at:
+            columns = {
+                root: to_numbers(values, source.decimal)
+                for root, values in columns.items()
+            }
+        return pl.DataFrame(columns).select(sum_.alias("c")).to_series()
+    except pl.exceptions.PolarsError as error:
+        raise DataError(
+            f"{source.where} has no column {at}, and it is no sum of columns ({error})"
+        ) from error
+
+
+def ask_about_recordings(
+    source: Source, recipe: Recipe, t: pl.Series, ids: pl.Series, *, by_name: bool
+) -> None:
+    """Raise DataError where a column of `source` that the `recipe` does not use tells recordings apart.
+
+    Such a column has few values, and changes where people are at one time twice, or go back in time.  With
+    `by_name` one is also asked about if it has a usual name, and people are seen under several of its values.
+    `t` and `ids` are those of all rows.
+    """
+    rows = pl.DataFrame({"id": ids, "t": t})
+    is_mixed, columns = _begins_again(rows, ["id"]), recipe.columns or {}
+    used = " ".join(map(str, columns.values()))
+    for k, name in enumerate(source.names):
+        key = _split_unit(name)[0]
+        if k in columns.values() or (name and name in used) or _CLOCK.search(key):
+            continue
+        is_usual = by_name and key in _RECORDINGS
+        if not (is_mixed or is_usual):
+            continue
+        table = rows.with_columns(c=source.column(k).cast(pl.String))
+        n_pieces = table.select("id", "c").n_unique()
+        if table["c"].n_unique() < 2 or n_pieces * _LONGEST_SHARE > len(rows):
+            continue
+        is_shared = n_pieces > rows["id"].n_unique()
+        if is_shared and (is_usual or not _begins_again(table, ["id", "c"])):
+            raise DataError(
+                f"{source.where}: column {name or k!r} changes where people or times begin again, so it "
+                f"seems to tell recordings apart; {advise(columns={'day': name or k})}; "
+                "if it does not, name the columns of id, x and y"
+            )
+
+
+def _begins_again(rows: pl.DataFrame, keys: list[str]) -> bool:
+    """Whether somebody is seen twice at one time, or goes back in time, among rows of the same `keys`."""
+    step = rows.select(pl.col("t").diff().over(keys)).to_series()
+    return bool((step <= 0).any())
+
+
+def _split_unit(name: str) -> tuple[str, str]:
+    """A name without blanks, accents and capitals, and its unit: ("posx", "mm") of "Pos X [mm]"."""
+    letters = unicodedata.normalize("NFKD", name.casefold())
+    words = re.findall(
+        r"[^\W_]+", "".join(each for each in letters if not unicodedata.combining(each))
+    )
+    has_unit = len(words) > 1 and words[-1] in (*_POSITION_NAMES, *_TIME_NAMES)
+    unit = words.pop() if has_unit else ""
+    return "".join(words), unit
+
+
+def _find_sums(source: Source, keys: Sequence[tuple[str, str]]) -> dict[str, str | int]:
+    """Column t as the sum of seconds and nanoseconds, or of a date and a time of day; else nothing."""
+    by_key = {"".join(key): source.names[k] for k, key in enumerate(keys)}
+    for key, name in by_key.items():
+        for nano, seconds in (
+            ("nanosec", "sec"),
+            ("nanosecs", "secs"),
+            ("nsec", "sec"),
+            ("nsecs", "secs"),
+        ):
+            if key.endswith(nano) and (
+                whole := by_key.get(key.removesuffix(nano) + seconds)
+            ):
+                return {"t": f'"{whole}" + 1e-9 * "{name}"'}
+    usual = {_split_unit(each)[0] for each in _USUAL["t"].split()}
+    clock = next((k for k, (key, _) in enumerate(keys) if key in usual), None)
+    date = by_key.get("date")
+    if clock is None or date is None:
+        return {}
+    first = source.column(clock).head(1).to_list()
+    if first and isinstance(first[0], str) and re.match(r"\d{1,2}:\d\d", first[0]):
+        return {"t": f'"{date}" || \'T\' || "{source.names[clock]}"'}
+    return {}
+
+
+def _candidates(
+    quantity: str,
+    given: Mapping[str, str | int],
+    names: Sequence[str],
+    keys: Sequence[tuple[str, str]],
+) -> list[str | int]:
+    """The columns that can hold a quantity: the one given, those with its name, or with a usual one."""
+    at = given.get(quantity)
+    if isinstance(at, int):
+        return [at]
+    if at is not None:
+        is_sum = re.search(r"[-+*/|(]", at) is not None
+        return [name for name in names if name == at] or ([at] if is_sum else [])
+    if exact := [name for name in names if name == quantity]:
+        return list(exact)
+    usual = {_split_unit(each)[0] for each in _USUAL[quantity].split()} | set(
+        _GEOGRAPHIC.get(quantity, ())
+    )
+    return [names[k] for k, (key, _) in enumerate(keys) if key in usual]
+
+
+def _suggest(
+    source: Source,
+    recipe: Recipe,
+    found: Mapping[str, str | int],
+    missing: Sequence[str],
+) -> str:
+    """As which columns people would walk, and how to read them.  A constant column is none of them."""
+    time = "frame" if "frame" in (*found, *missing) else "t"
+    names, given = source.names, dict(recipe.columns or {})
+    listed = (
+        ", ".join(map(repr, filter(None, names[:12])))
+        or f"{len(names)} fields without a header"
+    )
+    question = (
+        f"it has {listed}; {advise(columns={**given, **dict.fromkeys(missing, '...')})}"
+    )
+    known = {
+        q: column_of(source, at).head(_SAMPLE)
+        for q, at in found.items()
+        if q in (time, "id", "x", "y")
+    }
+    free = [k for k in range(len(names)) if (names[k] or k) not in found.values()][
+        :_LISTED
+    ]
+    columns: dict[str | int, np.ndarray] = {
+        found[q]: _as_floats(values) for q, values in known.items()
+    }
+    for k in free:
+        numbers = _as_floats(source.column(k).head(_SAMPLE))
+        usable = numbers[np.isfinite(numbers)]
+        if (
+            2 * len(usable) > len(numbers)
+            and np.ptp(usable) > 0
+            and len(columns) < _GUESSED + len(known)
+        ):
+            columns[names[k] or k] = numbers
+    if not free or not columns:
+        return question
+    shown, values = list(columns), np.array(list(columns.values()))
+    places = {
+        ("t", "id", "x", "y").index("t" if q == time else q): shown.index(found[q])
+        for q in known
+    }
+    metres = {UNITS[u] for _, u in map(_split_unit, names) if u in UNITS} | {
+        recipe.metres
+    } - {None}
+    for rate, unit in product(
+        (1.0, _FRAMES) if time == "t" else (_FRAMES,),
+        metres or [UNITS[u] for u in ("m", "cm", "mm", "ft")],
+    ):
+        if order := find_walking(values, places, rate, unit or 1.0):
+            is_counted = rate != 1
+            time = "frame" if is_counted else "t"
+            chosen = dict(
+                zip((time, "id", "x", "y"), [shown[k] for k in order], strict=True)
+            )
+            name = next((name for name, each in UNITS.items() if each == unit), "m")
+            more: dict[str, object] = {"frame_rate": _FRAMES} if is_counted else {}
+            if not metres and name in (
+                ("cm", "mm") if is_counted else ("cm", "mm", "ft")
+            ):
+                more["unit"] = name
+            guess = (
+                f"{_FRAMES:g} frames a second are only a guess: " if is_counted else ""
+            )
+            reading = given | chosen
+            return f"people walk if these are {reading}; {guess}{advise(columns=reading, **more)}"
+    return question
+
+
+def _as_floats(values: pl.Series) -> np.ndarray:
+    """A column as floats, whatever it holds: numbers, times, or texts of which each gets a number."""
+    for decimal in (".", ","):
+        numbers = to_numbers(values, decimal)
+        if 2 * numbers.null_count() <= len(values):
+            return to_times(numbers, "UTC").seconds.fill_null(np.nan).to_numpy()
+    times = to_times(values, "UTC").seconds
+    if 2 * times.null_count() <= len(values):
+        return times.fill_null(np.nan).to_numpy()
+    return to_ids(values).cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy()
