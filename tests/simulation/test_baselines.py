@@ -15,7 +15,7 @@ from szlib.simulation.monte_carlo import RolloutSetup, rollouts
 from szlib.simulation.scenario import Worlds
 
 SETTINGS = szlib.MPCSettings()
-BASELINES = [StraightController, SocialForceController, DynamicWindowController]
+BASELINES = [make for name, make in CONTROLLERS.items() if name != "MPC-CBF"]
 START, GOAL = (-4.0, 0.0, 0.0, 0.0), (4.0, 0.0)
 LANE = [((-6.0, y), (6.0, y)) for y in (1.2, -1.2)]
 

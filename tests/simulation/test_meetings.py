@@ -1,4 +1,4 @@
-"""The eleven meetings can be driven, vary as they say, and walls hide whom they should."""
+"""The meetings can be driven, vary as they say, and walls hide whom they should."""
 
 import pickle
 from dataclasses import replace
