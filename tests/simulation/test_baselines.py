@@ -30,8 +30,7 @@ def run(factory, people=(), walls=(), start=START, goal=GOAL):
 
 
 def test_baselines_are_listed_by_name():
-    assert list(CONTROLLERS)[1:] == ["straight", "social force", "dynamic window"]
-    assert [CONTROLLERS[name] for name in list(CONTROLLERS)[1:]] == BASELINES
+    assert set(CONTROLLERS) >= {"MPC-CBF", "straight", "social force", "dynamic window"}
 
 
 @pytest.mark.parametrize("factory", BASELINES)
