@@ -312,7 +312,7 @@ def test_every_promised_method_is_there(name: str) -> None:
 
 
 def test_every_scenario_is_there() -> None:
-    assert set(szlib.SCENARIOS) == {"passing", "corridor", "waiting", "making_room"}
+    assert set(szlib.SCENARIOS) >= {"passing", "corridor", "waiting", "making_room"}
 
 
 def test_an_object_that_users_hold_cannot_be_changed() -> None:

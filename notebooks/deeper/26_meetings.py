@@ -89,7 +89,8 @@ fig = meetings.draw_outcomes(outcomes)
 good = outcomes[outcomes["outcome"] == "arrives, enters no zone"]["controller"].value_counts()
 rivals = max(good.get(name, 0) for name in CONTROLLERS if name != "MPC-CBF")
 fig.suptitle(
-    f"MPC-CBF arrives without entering a zone in {good['MPC-CBF']} of 11 meetings, simple controllers in at most {rivals}"
+    f"MPC-CBF arrives without entering a zone in {good['MPC-CBF']} of {outcomes['meeting'].nunique()} meetings, "
+    f"simple controllers in at most {rivals}"
 )
 record.figure(fig, "outcomes")
 

@@ -36,7 +36,7 @@ _TWO_DOORS = szlib.Scenario(
     title="Two doors: a person stands in the nearer one",
 )
 PRESETS: dict[str, szlib.Scenario] = {**szlib.SCENARIOS, **szlib.MEETINGS, _TWO_DOORS.name: _TWO_DOORS}
-"""The scenes to begin with, by name: the four scenarios of the paper, eleven meetings, and two doors."""
+"""The scenes to begin with, by name: the scenarios of the paper, the meetings, and two doors."""
 CONSTRUCTORS: dict[str, Callable[..., szlib.MPCSettings]] = {
     "MPCSettings": szlib.MPCSettings,
     "MPCSettings.paper": szlib.MPCSettings.paper,

@@ -108,7 +108,7 @@ def make_parser() -> argparse.ArgumentParser:
     """The command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("files", nargs="*", type=Path, help="submissions; the rivals are always judged")
-    parser.add_argument("--meeting", choices=szlib.MEETINGS, help="one meeting; default: all eleven")
+    parser.add_argument("--meeting", choices=szlib.MEETINGS, help="one meeting; default: all")
     parser.add_argument("--worlds", type=int, default=12, help="worlds of each meeting")
     text = "default: a new one; - reads it from the standard input, where no submission can see it"
     parser.add_argument("--seed", default=str(secrets.randbelow(10**9)), help=text)

@@ -1,4 +1,4 @@
-"""Eleven meetings, four controllers: the tables of notebook 26.
+"""Meetings with several controllers: the tables of notebook 26.
 
     python -m studies.meetings 12    26_meetings.csv, 26_meetings_paired.csv   (variations)
 

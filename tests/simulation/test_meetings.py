@@ -1,4 +1,4 @@
-"""The eleven meetings can be driven, vary as they say, and walls hide whom they should."""
+"""The meetings can be driven, vary as they say, and walls hide whom they should."""
 
 import pickle
 from dataclasses import replace
@@ -18,14 +18,13 @@ ZONE = szlib.Ellipse((0.05, 0.0), (1.0, 0.7))
 SETTINGS = szlib.MPCSettings()
 
 
-def test_meetings_and_scenarios_have_their_names():
-    assert list(MEETINGS) == [
+def test_the_meetings_of_the_source_are_there():
+    assert set(MEETINGS) >= {
         "frontal approach", "pedestrian obstruction", "narrow hallway", "narrow doorway", "overtaking",
         "intersection", "blind corner", "parallel traffic", "perpendicular traffic", "circular crossing",
         "robot crowding",
-    ]  # fmt: skip
+    }  # fmt: skip
     assert szlib.MEETINGS is MEETINGS
-    assert list(szlib.SCENARIOS) == ["passing", "corridor", "waiting", "making_room"]
 
 
 @pytest.mark.parametrize("name", MEETINGS)

@@ -37,8 +37,7 @@ def logs():
     return {name: run(scenario) for name, scenario in szlib.SCENARIOS.items()}
 
 
-def test_the_papers_four_scenarios_have_claims_and_titles():
-    assert list(szlib.SCENARIOS) == ["passing", "corridor", "waiting", "making_room"]
+def test_scenarios_have_claims_and_titles():
     for scenario in szlib.SCENARIOS.values():
         assert scenario.walls.shape[1:] == (2, 2) and scenario.start.shape == (4,)
         assert all(np.hypot(*p.velocity) in (0, 0.5) for p in scenario.people)
