@@ -224,7 +224,7 @@ record.claim(
 # %% jupyter={"source_hidden": true}
 # What that means
 Markdown(
-    f"So \"spare\" is a strong word: with complementary coordinates {rim / max(removed, 1):.0%} of the removed samples still lie at the "
+    f'So "spare" is a strong word: with complementary coordinates {rim / max(removed, 1):.0%} of the removed samples still lie at the '
     f"edge, with plain ones {rim_plain / max(removed, 1):.0%}. The others lie near $r_{{max}}$, where all directions shrink to one point "
     "and the density changes fast. Those samples never touch the hull."
 )

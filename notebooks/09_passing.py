@@ -345,7 +345,12 @@ record.figure(fig, "worlds")
 ours, steps = worlds.loc[szlib.MPCSettings.gamma], worlds["worlds with an infeasible step"]
 best = steps.idxmin()
 record.key |= {"gamma with the fewest worlds with an infeasible step": best, "those worlds": int(steps.min())}
-verdict = "The choice holds." if best == ours.name else "The four scenarios did not choose the best of these."
+verdict = (
+    "The choice holds."
+    if best == ours.name
+    else f"The four scenarios did not choose the best of these: for a robot of your own begin with {best:g}. The lessons "
+    f"keep {ours.name:g}, the value with which the four scenarios were chosen and are shown."
+)
 Markdown(
     f"<details><summary>Answer</summary>\n\nIn {ours['worlds']:,.0f} worlds gamma = {ours.name:g} arrives in {ours['arrived']:.1%} "
     f"({ours['arrived, low']:.1%} to {ours['arrived, high']:.1%}); {steps[ours.name]} worlds have an infeasible step, "
