@@ -22,8 +22,8 @@ report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML fil
 	$(BIN)/szlib report --open
 
 docs: $(INSTALLED)  ## results/site: README, notebooks, which settings to choose, each public name, changes; no network
-	mkdir -p docs/pages
-	$(BIN)/sphinx-build -q -c docs -d docs/pages/.doctrees docs/pages results/site
+	mkdir -p .docs/pages
+	$(BIN)/sphinx-build -q -c .docs -d .docs/pages/.doctrees .docs/pages results/site
 
 slides: $(INSTALLED)  ## results/slides: a deck of each notebook, and all figures; SLIDES_FLAGS="--reveal FOLDER" needs no network
 	$(BIN)/python notebooks/tools/slides.py $(SLIDES_FLAGS)

@@ -66,7 +66,7 @@ def read_purpose(folder: Path) -> str:
 
 if __name__ == "__main__":
     shutil.rmtree(ROOT / ".venv", ignore_errors=True)
-    shutil.rmtree(ROOT / "docs" / "pages", ignore_errors=True)
+    shutil.rmtree(ROOT / ".docs" / "pages", ignore_errors=True)
     clean(ROOT / "results")
     if kept := sorted(path.name for path in (ROOT / "results").glob("[!.]*")):
         print(f"results/ keeps what szlib run did not write: {', '.join(kept)}")

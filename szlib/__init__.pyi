@@ -1,10 +1,7 @@
 from . import (
     control,
+    core,
     encounters,
-    errors,
-    files,
-    memory,
-    parallel,
     plaza,
     simulation,
     tracks,
@@ -21,6 +18,15 @@ from .control import (
     ellipse_distance,
     segment_distance,
     walls_from_map,
+)
+from .core.errors import (
+    DataError,
+    DataWarning,
+    MemoryLimitError,
+    SolverError,
+    StorageError,
+    SzlibError,
+    ZoneError,
 )
 from .encounters import (
     ATC_SQUARE,
@@ -40,15 +46,6 @@ from .encounters import (
     of_kind,
     time_shifted,
     walked_area,
-)
-from .errors import (
-    DataError,
-    DataWarning,
-    MemoryLimitError,
-    SolverError,
-    StorageError,
-    SzlibError,
-    ZoneError,
 )
 from .plaza import PlazaSettings, make_plaza
 from .simulation import (
@@ -125,26 +122,23 @@ __all__ = [
     "as_area",
     "compare",
     "control",
+    "core",
     "draw_costmap",
     "drive",
     "ellipse_distance",
     "encounter_kinds",
     "encounters",
-    "errors",
     "extract_days",
-    "files",
     "find_encounters",
     "find_pairs",
     "impose_zone",
     "make_plaza",
-    "memory",
     "minimum_enclosing_ellipse",
     "null_encounters",
     "null_pairs",
     "null_test",
     "of_kind",
     "pair_correlation",
-    "parallel",
     "plaza",
     "pool",
     "read_tracks",

@@ -69,17 +69,10 @@ def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
     low, high = np.zeros_like(p), np.full_like(p, np.pi / 2)
     for _ in range(_BISECTIONS):
         t = (low + high) / 2
-        below = (
-            a * p * np.sin(t)
-            - b * q * np.cos(t)
-            - (a**2 - b**2) * np.sin(t) * np.cos(t)
-            < 0
-        )
+        below = a * p * np.sin(t) - b * q * np.cos(t) - (a**2 - b**2) * np.sin(t) * np.cos(t) < 0
         low, high = np.where(below, t, low), np.where(below, high, t)
     inside = (p / a) ** 2 + (q / b) ** 2 < 1
-    return np.asarray(
-        np.hypot(p - a * np.cos(low), q - b * np.sin(low)) * np.where(inside, -1, 1)
-    )
+    return np.asarray(np.hypot(p - a * np.cos(low), q - b * np.sin(low)) * np.where(inside, -1, 1))
 
 
 def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:

@@ -115,8 +115,8 @@ def _null_model(zone: FittedZone) -> Iterator[str]:
         )
     if test.grouped > MOST_GROUPED:
         yield (
-            f"{test.grouped:.0%} of the people walk with somebody, and the null model moved each alone: groups "
-            "look like respect then; compare every pair, with szlib.find_pairs and szlib.null_pairs"
+            f"{test.grouped:.0%} of the people walk with somebody, and the null model moved each alone: "
+            "groups look like respect then; compare every pair, with szlib.find_pairs and szlib.null_pairs"
         )
 
 

@@ -21,8 +21,8 @@ pytest.importorskip("myst_nb")
 def folder(tmp_path_factory):
     """The site with one notebook."""
     folder = tmp_path_factory.mktemp("site")
-    (ROOT / "docs" / "pages").mkdir(exist_ok=True)
-    options = ["-q", "-c", "docs", "-d", str(folder / "doctrees"), "docs/pages"]
+    (ROOT / ".docs" / "pages").mkdir(exist_ok=True)
+    options = ["-q", "-c", ".docs", "-d", str(folder / "doctrees"), ".docs/pages"]
     subprocess.run(
         [sys.executable, "-m", "sphinx", *options, str(folder / "html")],
         cwd=ROOT, env=os.environ | {"SZLIB_DOCS_NOTEBOOKS": "07*", "SZLIB_REPOSITORY": "me/szlib"},

@@ -1,6 +1,6 @@
 """The site of `make docs`: README, notebooks, the page of decisions, every public name, changes.
 
-Sphinx with myst-nb makes it without a network. `copy_pages` makes the copies that it reads, in `docs/pages`.
+Sphinx with myst-nb makes it without a network. `copy_pages` makes the copies that it reads, in `.docs/pages`.
 
 Environment variables: $SZLIB_REPOSITORY, such as OWNER/szlib on GitHub, adds links to Binder and Colab;
 $SZLIB_DOCS_NOTEBOOKS, such as "07*", makes a site of these notebooks only, for a test.
