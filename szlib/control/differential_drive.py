@@ -45,6 +45,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
 from typing import Any, cast
 
@@ -57,9 +58,9 @@ from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
 from .obstacles import Obstacle, Obstacles, Path
 from .people import STANDING_SPEED, People, SpeedZone, Tracker
-from .settings import MPCSettings
+from .settings import TOLERANCE, MPCSettings
 from .step import Scene, Step
-from .verification import ROUNDING, Report, verify_step
+from .verification import ROUNDING, Report, measure_way, verify_step
 from .ways import Heading, Point
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
@@ -153,10 +154,10 @@ class _Wheels:
 
 @dataclass(frozen=True, repr=False)
 class DriveStep:
-    """What a differential drive does next; everything else is said of the point ahead of its axle.
+    """What a differential drive does next, and how far it can be relied upon.
 
-    What a `Step` has, such as `safe`, `h` or `way`, is that of `point`: what the point claims holds of the
-    disc that it carries, as this module proves. `walls_safe` and `passively_safe` are about the disc itself.
+    What else a `Step` has, such as `status` or `way`, is that of `point`, the step of the point ahead of the
+    axle. Its claims `walls_safe` and `passively_safe` are about the disc.
 
     Attributes
     ----------
@@ -165,7 +166,7 @@ class DriveStep:
     own : state of the robot now, (x, y, theta, v, omega).
     point : the step of the point ahead of the axle.
     wheels : how they follow the point.
-    spare : by which the disc is smaller than that of the point [m].
+    settings : of the disc; those of the point have a larger radius.
     """
 
     control: Array
@@ -173,7 +174,7 @@ class DriveStep:
     own: Array
     point: Step
     wheels: _Wheels
-    spare: float
+    settings: MPCSettings
 
     def __getattr__(self, name: str) -> Any:
         """As of the step of the point."""
@@ -181,15 +182,55 @@ class DriveStep:
             raise AttributeError(name)
         return getattr(self.point, name)
 
+    @cached_property
+    def scene(self) -> Scene:
+        """What the step was asked, for the disc."""
+        asked, names = self.point.scene, ("zones", "fixed", "near_fixed")
+        sized = {
+            name: Obstacles.of(getattr(asked, name).items, self.settings)
+            for name in names
+        }
+        state = tuple(self.predicted[0].tolist())
+        return asked._replace(state=state, settings=self.settings, **sized)
+
+    @property
+    def h(self) -> Array:
+        """Barriers of the disc now, as of `Step.h` [m]."""
+        return self.scene.spread(self.scene.barriers.h(*self.scene.state[:2]))
+
+    @property
+    def safe(self) -> bool:
+        """As of `Step.safe`, for the disc.
+
+        No person is unknown, the plan of the point satisfies every row without a price, and the disc has h >=
+        0 now and dt later, and overlaps no body and no wall until then, if people keep their velocity.
+        """
+        points, dt = self.predicted[:2, :2], self.settings.dt
+        bows = np.full((2, 1), abs(self.control.prod()) * dt**2 / 8)
+        path = Path(points, np.array([0.0, dt]), *bows)
+        h = self.scene.barriers.h(*points.T, path.times)
+        least = min(h.min(initial=inf), self.scene.bound_gap(path))
+        return self.point.feasible and not self.point.unknown and least >= -TOLERANCE
+
     def verify(self) -> Report:
         """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
-        found = verify_step(self.point, self._carry, self.spare)
-        end = self._drive(self.own, self.control, self.point.scene.settings.dt)[-1]
-        differs = np.abs(end - self.predicted[1, :2]).max()
-        if differs <= ROUNDING * max(1.0, np.abs(end).max()):
-            return found
-        fault = f"motion of the disc differs by {differs:.2g}"
-        return replace(found, faults=(*found.faults, fault))
+        s = self.settings
+        spare = self.point.scene.settings.r_robot - s.r_robot
+        found, faults = verify_step(self.point, self._carry, spare), list[str]()
+        path = np.vstack([self.own[:2], self._drive(self.own, self.control, s.dt)])
+        h, gap, least = measure_way(self.scene, path, s.dt * np.r_[0.0, _SHARES])
+        differs = np.abs(path[-1] - self.predicted[1, :2]).max()
+        if differs > ROUNDING * max(1.0, np.abs(path).max()):
+            faults.append(f"motion of the disc differs by {differs:.2g}")
+        differs = np.abs(h - self.h[self.scene.rows]).max(initial=0.0)
+        if differs > ROUNDING * max(1.0, np.abs(h).max(initial=0.0)):
+            faults.append(f"h of the disc differs by {differs:.2g}")
+        safe = found.feasible and not self.point.unknown and least >= -TOLERANCE
+        if self.safe and not safe:
+            faults.append("the step says that the disc is safe; it is not")
+        faults = [*found.faults, *faults]
+        now = float(h.min(initial=inf))
+        return replace(found, faults=tuple(faults), h=now, gap=gap, safe=safe)
 
     def _carry(self, points: Array, times: Array) -> tuple[Array, Array]:
         """The way of the disc, whose wheels follow the point from one of `points` to the next."""
@@ -212,9 +253,8 @@ class DriveStep:
 
     def __repr__(self) -> str:
         (v, omega), safe = self.control.tolist(), "safe" if self.safe else "not safe"
-        return (
-            f"DriveStep({self.status}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s)"
-        )
+        h = min(self.h.tolist(), default=inf)
+        return f"DriveStep({self.status}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s, min h={h:.3g} m)"
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified, as `Step.explain` does for the point."""
@@ -364,7 +404,7 @@ class DifferentialDrive(MPCCBF):
         self._planned_velocity = step.predicted[1, 2:].tolist()
         self._clock.hold(controls[0])
         return DriveStep(
-            controls[0], states, self._own, step, self._wheels, self._spare
+            controls[0], states, self._own, step, self._wheels, self.settings
         )
 
     def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:

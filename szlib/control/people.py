@@ -180,15 +180,20 @@ def predict(
     >>> one.after(1.0).position
     (1.0, 0.2)
     """
-    rows = check_array("people", people, (*np.shape(people)[:1], 4)).tolist()
-    spreads = spread if np.ndim(spread) else np.full(len(rows), spread)
+    rows = check_array("people", people, (..., 4))
+    require(rows.ndim == 2, "people", rows.shape, "of shape (n, 4)", SolverError)
+    positions = check_array("positions", positions, (...,))
+    spreads = check_array("spread", spread, (...,))
+    spreads = spreads if spreads.ndim else np.full(len(rows), spread)
     for name, given in (("positions", positions), ("spread", spreads)):
-        is_each = np.shape(given)[:1] == np.shape(rows)[:1]
+        is_each = given.shape[:1] == (len(rows),)
         expected = f"one for each of {len(rows)} people"
-        require(is_each, name, np.shape(given), expected, SolverError)
+        require(is_each, name, given.shape, expected, SolverError)
     return [
         Person((x, y), (vx, vy), prediction=Prediction(times, xy, own))
-        for (x, y, vx, vy), xy, own in zip(rows, positions, spreads, strict=True)
+        for (x, y, vx, vy), xy, own in zip(
+            rows.tolist(), positions, spreads, strict=True
+        )
     ]
 
 

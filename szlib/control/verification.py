@@ -89,8 +89,8 @@ def verify_step(step: Any, carry: Carry | None = None, spare: float = 0.0) -> Re
     residual = h[:, 1:] - (1 - s.gamma) ** (lasts / s.dt) * h[:, :-1]
     worst = min(_list_rows(scene, x, h, residual), key=lambda row: row.value)
     slack, least = max(0.0, -worst.value), float(h[:, :2].min(initial=np.inf))
-    gap = _find_gap(scene, path, ways.times[:_SAMPLES])
-    feasible, lowest = slack <= TOLERANCE, min(gap, least)
+    _, gap, lowest = measure_way(scene, path, ways.times[:_SAMPLES])
+    feasible = slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
     compared = {
         "motion": (ways.states, x),
@@ -189,14 +189,19 @@ def _check_guard(
         yield "the step says that it rests before somebody walks into it; it does not"
 
 
-def _find_gap(scene: Any, path: Array, times: Array) -> float:
-    """Smallest gap on the `path` of a step, shape (n, 2), as of `Report.gap` [m]; -inf in a solid wall."""
-    solids = scene.solids
+def measure_way(scene: Any, path: Array, times: Array) -> tuple[Array, float, float]:
+    """Measure the way of a step, shape (n, 2), with the formulas of this module.
+
+    Returns h now, shape (obstacles,), the smallest gap, as of `Report.gap`, -inf in a solid wall, and the
+    smallest of it and of h now and at the end [m].
+    """
+    h = _measure(scene, path, times, is_barrier=True)
+    gaps = _measure(scene, path, times).min(initial=np.inf)
+    zones = h[: len(scene.people)].min(initial=np.inf) + scene.settings.eps
+    gap, solids = float(min(gaps, zones)), scene.solids
     if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
-        return -np.inf
-    h = _measure(scene, path, times, is_barrier=True)[: len(scene.people)]
-    gaps = [*_measure(scene, path, times), *(h + scene.settings.eps)]
-    return float(np.min(gaps, initial=np.inf))
+        gap = -np.inf
+    return h[:, 0], gap, float(h[:, [0, -1]].min(initial=gap))
 
 
 def _list_rows(scene: Any, x: Array, h: Array, residual: Array) -> Iterator[Row]:

@@ -102,14 +102,14 @@ def _is_corner(part: Any) -> bool:
 
 def _draw_lines(corners: Any) -> Any:
     """Lines of Shapely from their corners, shape (..., m, 2) [m]."""
-    given = np.shape(corners)
+    numbers = check_array("a wall", corners, (...,))
+    given = numbers.shape
     if given[1:] == (4,):
         raise SolverError(
             "walls must be segments [[(xa, ya), (xb, yb)], ...], shape (n, 2, 2); got rows of four numbers: "
             "use np.reshape(walls, (-1, 2, 2))"
         )
-    numbers = check_array("a wall", corners, (..., 2))
-    is_line = numbers.ndim > 1 and numbers.shape[-2] > 1
+    is_line = given[-1:] == (2,) and len(given) > 1 and given[-2] > 1
     require(is_line, "a wall", given, "of shape (m, 2), with m > 1", SolverError)
     return np.ravel(shapely.linestrings(numbers))
 

@@ -83,12 +83,13 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     ------
     SolverError : another shape, not numbers, not finite, or beyond +-`LARGEST`.
     """
+    expected = f"numbers of shape {shape}".replace("Ellipsis", "...")
     try:
         array = np.asarray(value)
-    except ValueError as error:
-        raise SolverError(f"{name} must have shape {shape}; got {value!r}") from error
+    except ValueError as error:  # rows of several lengths
+        raise SolverError(f"{name} must be {expected}; got {value!r}") from error
     if array.dtype.kind not in "iuf":
-        raise SolverError(f"{name} must be numbers of shape {shape}; got {value!r}")
+        raise SolverError(f"{name} must be {expected}; got {value!r}")
     fits = array.shape == shape
     if ... in shape:
         fits = array.shape[max(0, array.ndim - len(shape) + 1) :] == shape[1:]
