@@ -185,13 +185,14 @@ class DriveStep:
     @cached_property
     def scene(self) -> Scene:
         """What the step was asked, for the disc."""
-        asked, names = self.point.scene, ("zones", "fixed", "near_fixed")
-        sized = {
-            name: Obstacles.of(getattr(asked, name).items, self.settings)
-            for name in names
-        }
-        state = tuple(self.predicted[0].tolist())
-        return asked._replace(state=state, settings=self.settings, **sized)
+        s, asked = self.settings, self.point.scene
+        return asked._replace(
+            state=tuple(self.predicted[0].tolist()),
+            settings=s,
+            zones=Obstacles.of(asked.zones.items, s),
+            fixed=Obstacles.of(asked.fixed.items, s),
+            near_fixed=Obstacles.of(asked.near_fixed.items, s),
+        )
 
     @property
     def h(self) -> Array:
@@ -208,7 +209,7 @@ class DriveStep:
         points, dt = self.predicted[:2, :2], self.settings.dt
         bows = np.full((2, 1), abs(self.control.prod()) * dt**2 / 8)
         path = Path(points, np.array([0.0, dt]), *bows)
-        h = self.scene.barriers.h(*points.T, path.times)
+        h = self.scene.barriers.h(points[:, 0], points[:, 1], path.times)
         least = min(h.min(initial=inf), self.scene.bound_gap(path))
         return self.point.feasible and not self.point.unknown and least >= -TOLERANCE
 
