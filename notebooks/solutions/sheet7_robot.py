@@ -12,19 +12,24 @@
 # ---
 
 # %% [markdown]
-# # Sheet 6 - The robot
+# # Sheet 7 - The robot
 #
 # Write each function, then run the cell below it: it asks your function for many fresh cases and says
 # what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
-# `judges.hint("speed_limit", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# `judges.hint("largest_gamma", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
 # pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · next: [sheet
-# 7](sheet7_controller.ipynb) · [to do](../exercises/sheet6_robot.ipynb) ·
-# [solved](../solutions/sheet6_robot.ipynb) · 1 h 50 min · belongs to [07](../07_barriers.ipynb),
-# [09](../09_passing.ipynb), [11](../11_waiting.ipynb), [12](../12_among_people.ipynb),
-# [21](../deeper/21_feasibility.ipynb)
+# [Start](../00_start_here.ipynb) · before: [sheet 6](sheet6_controller.ipynb) · [to
+# do](../exercises/sheet7_robot.ipynb) · [solved](../solutions/sheet7_robot.ipynb) · 1 h 45 min · belongs to
+# [08](../08_build_a_controller.ipynb), [09](../09_passing.ipynb), [11](../11_waiting.ipynb),
+# [12](../12_among_people.ipynb)
+
+# %%
+# Solution: the judges are in the folder of the sheets.
+import sys
+
+sys.path.append("../exercises")
 
 # %%
 import judges
@@ -35,25 +40,7 @@ import szlib
 from szlib.workbook import figures
 
 # %% [markdown]
-# ## 6.1 The speed limit (5 min)
-#
-# The robot drives straight at a person who walks straight at the robot with `person_speed` [m/s]. The
-# barrier is at `h` [m] and may fall by the share `gamma` in a step of `dt` [s]. How fast may the
-# robot be [m/s]? (Negative: it has to go back.)
-
-
-# %%
-def speed_limit(h, gamma, dt, person_speed):
-    """Largest speed of the robot towards the person [m/s]."""
-    # YOUR CODE HERE
-    raise NotImplementedError()
-
-
-# %%
-judges.check("speed_limit", speed_limit)
-
-# %% [markdown]
-# ## 6.2 gamma by experiment (40 min)
+# ## 7.1 gamma by experiment (40 min)
 #
 # With the paper's two barrier steps ($N_h = 2$, 0.2 s) a large gamma lets the robot find out too late
 # that it cannot brake any more: the problem has no solution, the step is *infeasible*. For the
@@ -75,15 +62,29 @@ plt.show()
 # %%
 def largest_gamma(zone, a_max, gammas):
     """The largest gamma, going up from the smallest, before the first with an infeasible step."""
-    # YOUR CODE HERE
-    raise NotImplementedError()
+    ### BEGIN SOLUTION
+    scenario, kept = szlib.SCENARIOS["passing"], 0.0
+    for gamma in gammas:
+        settings = szlib.MPCSettings(gamma=gamma, a_max=a_max)
+        log = szlib.simulate(scenario, szlib.MPCCBF(zone, walls=scenario.walls, settings=settings))
+        if log.metrics()["infeasible_steps"]:
+            break
+        kept = gamma
+    return kept
+    ### END SOLUTION
 
 
 # %%
 judges.check("largest_gamma", largest_gamma)
 
 # %% [markdown]
-# ## 6.3 The terminal proof (15 min)
+# **Solution.** Straight ahead the barrier allows $v = \gamma h / \Delta t$, so $h$ falls off as
+# $e^{-\gamma t / \Delta t}$ and the robot must brake with $\gamma v / \Delta t$. At 1 m/s it can while
+# $\gamma \le a_{max} \Delta t / v$: 0.05 with a brake of 0.5 m/s². The limit by experiment is somewhat
+# larger, for the robot also goes around.
+
+# %% [markdown]
+# ## 7.2 The terminal proof (15 min)
 #
 # With `terminal="rest"` each plan ends at rest, $\mathbf{v}_N = 0$, and the barrier rows hold on the
 # whole horizon. Everybody stands. The robot has applied the first control of `plan`, shape (N, 2)
@@ -94,15 +95,22 @@ judges.check("largest_gamma", largest_gamma)
 # %%
 def next_plan(plan):
     """A plan (N, 2) that satisfies the next problem, from one that satisfied the last."""
-    # YOUR CODE HERE
-    raise NotImplementedError()
+    ### BEGIN SOLUTION
+    return np.vstack([plan[1:], np.zeros((1, 2))])
+    ### END SOLUTION
 
 
 # %%
 judges.check("next_plan", next_plan)
 
 # %% [markdown]
-# ## 6.4 Predict, then run (20 min)
+# **Solution.** Its states are $\mathbf{x}_1, \dots, \mathbf{x}_N, \mathbf{x}_N$. All rows but the
+# last held before; the last is $h(\mathbf{x}_N) - (1-\gamma) h(\mathbf{x}_N) = \gamma
+# h(\mathbf{x}_N)$, and the old rows give $h(\mathbf{x}_N) \ge (1-\gamma)^N h(\mathbf{x}_0) \ge 0$. So
+# one solution leads to the next, for ever.
+
+# %% [markdown]
+# ## 7.3 Predict, then run (20 min)
 #
 # Before you run anything: what becomes larger, and what smaller? `prediction` is asked about twelve changes
 # of one parameter, from `before` to `after`, and answers "larger" or "smaller" for a `quantity`:
@@ -123,15 +131,19 @@ judges.check("next_plan", next_plan)
 # %%
 def prediction(scenario, change, before, after, quantity):
     """Say "larger" or "smaller": what the quantity becomes with this change."""
-    # YOUR CODE HERE
-    raise NotImplementedError()
+    ### BEGIN SOLUTION
+    grows = after == "behind" if change == "approach" else after > before
+    if change == "width":  # a longer way around; everything else falls
+        return "larger" if grows else "smaller"
+    return "smaller" if grows else "larger"
+    ### END SOLUTION
 
 
 # %%
 judges.check("prediction", prediction)
 
 # %% [markdown]
-# ## 6.5 Count the ways (20 min)
+# ## 7.4 Count the ways (20 min)
 #
 # `paths`, shape (m, T, 2), are m ways of a robot to its goal [m]. `people`, shape (n, T, 2), is where n people are
 # at the same T times; some of them walk. All ways begin and end at the same two places, and at no time is the robot in a
@@ -143,18 +155,35 @@ judges.check("prediction", prediction)
 # %%
 def count_ways(paths, people):
     """Number of distinct ways among the paths."""
-    # YOUR CODE HERE
-    raise NotImplementedError()
+    ### BEGIN SOLUTION
+    offset = paths[:, None] - people
+    angles = np.unwrap(np.arctan2(offset[..., 1], offset[..., 0]), axis=-1)
+    turns = angles[..., -1] - angles[..., 0]
+    sides = np.round((turns - turns[0]) / (2 * np.pi))
+    return len(np.unique(sides, axis=0))
+    ### END SOLUTION
 
 
 # %%
 judges.check("count_ways", count_ways)
 
 # %% [markdown]
-# ## 6.6 In your own words (10 min)
+# **Solution.** The turns of two ways around one person differ by a whole number of full turns, because both begin and end
+# at the same places. So the turns, relative to the first way, are rounded to whole numbers, and equal rows are the same way.
+# A plan of one row cannot become a plan of another row by small changes.
+
+# %% [markdown]
+# ## 7.5 In your own words (10 min)
 #
 # You must choose gamma for a robot in a hospital corridor. Which experiments of this sheet help, which do
 # not, and what would you have to measure in that corridor first? Write five to eight sentences.
 
 # %% [markdown]
-# YOUR ANSWER HERE
+# **Rubric** (10 points; a person grades this answer)
+#
+# | points | for |
+# |---|---|
+# | 3 | gamma depends on brake, speed and horizon: 4.2 and 7.1 with the numbers of that robot |
+# | 3 | the scenarios have one person who keeps their velocity; the corridor has others |
+# | 2 | measured first: speeds and sudden stops of people, delay of the sensors, the true brake |
+# | 2 | infeasible steps are separated from h < 0, and the answer says what gives way first |
