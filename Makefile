@@ -25,7 +25,7 @@ docs: $(INSTALLED)  ## results/site: README, notebooks, which settings to choose
 	mkdir -p .docs/pages
 	$(BIN)/sphinx-build -q -c .docs -d .docs/pages/.doctrees .docs/pages results/site
 
-slides: $(INSTALLED)  ## results/slides: a deck of each notebook, and all figures; SLIDES_FLAGS="--reveal FOLDER" needs no network
+slides: $(INSTALLED)  ## results/slides: a deck and a handout (PDF) of each notebook, and all figures; SLIDES_FLAGS="07 08": some
 	$(BIN)/python notebooks/tools/slides.py $(SLIDES_FLAGS)
 
 # Types are checked beside the tests; both must pass.  The notebooks are executed by `make run`, not here.

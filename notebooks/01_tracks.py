@@ -47,7 +47,7 @@ seed = 0
 results = "../results"
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 import warnings
 
 import matplotlib.pyplot as plt
@@ -63,18 +63,6 @@ from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 record = NotebookRecord("01_tracks", globals())
 gap_reason = "longer silences are other people as often as not"
-parameters(
-    [
-        ("clock", "0.1 s", ASSUMED, "two people's samples must coincide; the paper's control step"),
-        ("velocity span", f"+-{clock.VELOCITY_SPAN} s", ASSUMED, "a step is about 0.5 s: less sees the sway"),
-        ("longest gap", "0.5 s raw, 1.6 s at 1 Hz", MEASURED, gap_reason),
-        ("event days", "none left out", ASSUMED, "the paper removed them by hand; pass exclude="),
-        ("area", record.cache.area or "the data's own", ASSUMED, "the paper names none; see below"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 files, options = record.cache.files(), record.cache.method.read_options()
 raw = readers.read_raw(files, recipe=options)
 people = clock.to_clock(raw, max_gap=options.max_gap)
@@ -96,6 +84,18 @@ right.set(
     xlabel="speed [m/s]", ylabel="person-hours", title=f"People who walk: {walking.median():.2f} m/s (median)"
 )
 record.figure(fig, "map")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+parameters(
+    [
+        ("clock", "0.1 s", ASSUMED, "two people's samples must coincide; the paper's control step"),
+        ("velocity span", f"+-{clock.VELOCITY_SPAN} s", ASSUMED, "a step is about 0.5 s: less sees the sway"),
+        ("longest gap", "0.5 s raw, 1.6 s at 1 Hz", MEASURED, gap_reason),
+        ("event days", "none left out", ASSUMED, "the paper removed them by hand; pass exclude="),
+        ("area", record.cache.area or "the data's own", ASSUMED, "the paper names none; see below"),
+    ]
+)
 
 # %% jupyter={"source_hidden": true}
 # This data in numbers

@@ -51,7 +51,7 @@ has_walls = False  # True: the outline of the area is a wall, and the space may 
 examples = 100  # paths drawn
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -70,23 +70,6 @@ record = NotebookRecord("02_encounters", globals())
 conditions = record.cache.method.encounter_settings()  # of an encounter
 space = conditions.space
 beyond = "allowed" if has_walls else "not allowed"
-
-# %% jupyter={"source_hidden": true}
-# Parameters, with sources
-parameters(
-    [
-        ("attentional space", f"{space.width:g} m x {space.length:g} m", PAPER, "sec. 2"),
-        ("ahead of the person", not space.centred, ASSUMED, "people attend to what they walk towards"),
-        ("window", f"{duration:g} s", PAPER, f"{round(10 * duration) + 1} samples of 0.1 s"),
-        ("distance at the opening", f">= {min_distance:g} m", PAPER, "people closer than 1 m walk together"),
-        ("speed of the reference pedestrian", f">= {min_speed:g} m/s", PAPER, "a direction is needed"),
-        ("space beyond the area", beyond, ASSUMED, "unless the outline is a wall"),
-        ("other person inside the space", "at the opening", ASSUMED, "see below: two readings"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 tracks = record.cache.tracks()
 square = record.cache.find_area(tracks)
 samples = record.cache.store_encounters(szlib.find_encounters(tracks, square=square, settings=conditions))
@@ -106,6 +89,20 @@ plots.plot_encounter_paths(paths, n_shown=examples, ax=right)
 right.set_title(f"{min(examples, count)} of {count:,} encounters")
 right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
 record.figure(fig, "paths")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+parameters(
+    [
+        ("attentional space", f"{space.width:g} m x {space.length:g} m", PAPER, "sec. 2"),
+        ("ahead of the person", not space.centred, ASSUMED, "people attend to what they walk towards"),
+        ("window", f"{duration:g} s", PAPER, f"{round(10 * duration) + 1} samples of 0.1 s"),
+        ("distance at the opening", f">= {min_distance:g} m", PAPER, "people closer than 1 m walk together"),
+        ("speed of the reference pedestrian", f">= {min_speed:g} m/s", PAPER, "a direction is needed"),
+        ("space beyond the area", beyond, ASSUMED, "unless the outline is a wall"),
+        ("other person inside the space", "at the opening", ASSUMED, "see below: two readings"),
+    ]
+)
 
 # %% jupyter={"source_hidden": true}
 # This data in numbers

@@ -47,7 +47,7 @@ r_max = 2.0  # distance within which people count [m]
 intruders = 0.01  # share of slow intruders on the plaza that puts the rules to the test
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
@@ -62,6 +62,20 @@ from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, para
 from szlib.zones import outliers
 
 record = NotebookRecord("03_outliers", globals())
+samples = record.cache.encounters()
+close = samples[samples["distance"] <= r_max]
+outlier = outliers.is_outlier(close, fraction=fraction, r_max=r_max)
+los, r = close["los_angle"].to_numpy(), close["distance"].to_numpy()
+plain = np.column_stack([r * np.cos(los), r * np.sin(los)])
+points = outliers.complementary_points(close, r_max=r_max)
+fig, (left, right) = plt.subplots(1, 2, figsize=(10, 3.5), layout="constrained")
+for ax, each in ((left, plain), (right, points)):
+    ax.plot(*each[~outlier].T, ".", color=figures.GREY, markersize=1.5, rasterized=True)
+    ax.plot(*each[outlier].T, "x", color=figures.RED, markersize=6, mew=1.4)
+figures.label_metres(left, f"{len(close):,} samples around a person", person=True)
+figures.label_metres(right, f"Turned inside out: the {outlier.sum()} most alone (x)")
+right.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
+record.figure(fig, "outliers")
 
 # %% jupyter={"source_hidden": true}
 # Parameters, with sources
@@ -77,23 +91,6 @@ parameters(
         ("features", "x', y'", ASSUMED, "speed would need a scale: metres for a difference of 1 m/s"),
     ]
 )
-
-# %% jupyter={"source_hidden": true}
-# Figure
-samples = record.cache.encounters()
-close = samples[samples["distance"] <= r_max]
-outlier = outliers.is_outlier(close, fraction=fraction, r_max=r_max)
-los, r = close["los_angle"].to_numpy(), close["distance"].to_numpy()
-plain = np.column_stack([r * np.cos(los), r * np.sin(los)])
-points = outliers.complementary_points(close, r_max=r_max)
-fig, (left, right) = plt.subplots(1, 2, figsize=(10, 3.5), layout="constrained")
-for ax, each in ((left, plain), (right, points)):
-    ax.plot(*each[~outlier].T, ".", color=figures.GREY, markersize=1.5, rasterized=True)
-    ax.plot(*each[outlier].T, "x", color=figures.RED, markersize=6, mew=1.4)
-figures.label_metres(left, f"{len(close):,} samples around a person", person=True)
-figures.label_metres(right, f"Turned inside out: the {outlier.sum()} most alone (x)")
-right.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
-record.figure(fig, "outliers")
 
 # %% jupyter={"source_hidden": true}
 # This data in numbers

@@ -18,7 +18,7 @@
 #     - '03'
 #     exercises:
 #     - 3.1-3.3
-#     - '4.2'
+#     - '3.5'
 #     week: 2
 # ---
 
@@ -35,7 +35,7 @@
 # [Start](00_start_here.ipynb) · before: [03](03_outliers.ipynb) · next: [5 - Social zones](05_zones.ipynb)
 # · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4b · 25 min · needs [03](03_outliers.ipynb) ·
 # exercises: [3.1-3.3](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)),
-# [4.2](exercises/sheet4_certainty.ipynb#4.2-Why-the-hull-shrinks-(15-min))
+# [3.5](exercises/sheet3_zones.ipynb#3.5-Why-the-hull-shrinks-(15-min))
 #
 # **Afterwards you can** turn samples into a hull, cut it at a speed, and enclose the zone in the smallest
 # ellipse.
@@ -51,7 +51,7 @@ zone_speed = 1.1  # of the slice shown [m/s]
 speeds = [0.7, 0.9, 1.1, 1.3]  # of the slices of the hull [m/s]
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 import warnings
 
 import matplotlib.pyplot as plt
@@ -69,18 +69,6 @@ from szlib.zones import hulls, outliers
 
 warnings.simplefilter("ignore", szlib.DataWarning)  # the line below the first figure says it
 record = NotebookRecord("04_hull", globals())
-parameters(
-    [
-        ("outliers", "0.2 % of the samples, 20 neighbours", PAPER, "as in chapter 03"),
-        ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
-        ("speed", "of the reference pedestrian, at the sample", PAPER, "not the mean of the encounter"),
-        ("slices", f"{speeds} m/s", ASSUMED, "the paper shows a range of speeds"),
-        ("zone", "r_max - R', not the slice", ASSUMED, "the paper does not say; map first, enclose second"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 samples = record.cache.encounters()
 paper_rule = {"fraction": outliers.FRACTION, "n_neighbours": outliers.N_NEIGHBOURS}
 inliers = szlib.remove_outliers(samples, r_max=r_max, **paper_rule)
@@ -104,6 +92,18 @@ right.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
 right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 figures.label_metres(right, "What each cut leaves free: the zone at that speed", person=True)
 record.figure(fig, "hull")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+parameters(
+    [
+        ("outliers", "0.2 % of the samples, 20 neighbours", PAPER, "as in chapter 03"),
+        ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
+        ("speed", "of the reference pedestrian, at the sample", PAPER, "not the mean of the encounter"),
+        ("slices", f"{speeds} m/s", ASSUMED, "the paper shows a range of speeds"),
+        ("zone", "r_max - R', not the slice", ASSUMED, "the paper does not say; map first, enclose second"),
+    ]
+)
 
 # %% jupyter={"source_hidden": true}
 # How this data differs from the plaza

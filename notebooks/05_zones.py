@@ -17,8 +17,9 @@
 #     needs:
 #     - '04'
 #     exercises:
-#     - 3.4-3.5
+#     - '3.4'
 #     - '4.1'
+#     - '4.3'
 #     week: 2
 # ---
 
@@ -34,8 +35,9 @@
 # [Start](00_start_here.ipynb) · before: [04](04_hull.ipynb) · next: [6 - Respect or
 # emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 30 min · needs
 # [04](04_hull.ipynb) · exercises:
-# [3.4-3.5](exercises/sheet3_zones.ipynb#3.4-A-zone-of-your-own-(an-evening,-150-min)),
-# [4.1](exercises/sheet4_certainty.ipynb#4.1-The-quantile-zone-in-one-direction-(10-min))
+# [3.4](exercises/sheet3_zones.ipynb#3.4-The-quantile-zone-in-one-direction-(10-min)),
+# [4.1](exercises/sheet4_own_zone.ipynb#4.1-A-zone-of-your-own-(an-evening,-150-min)),
+# [4.3](exercises/sheet4_own_zone.ipynb#4.3-In-your-own-words-(10-min))
 #
 # **Afterwards you can** estimate a zone that does not shrink with more data, and say how far to trust it.
 # **Words.** *bootstrap*: draw people from the data at random, with repetition, and estimate again: how far
@@ -52,7 +54,7 @@ q = 0.05  # share of encounters that may enter the quantile zone
 zone_speed = 1.1  # whose zone the robot keeps [m/s]
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 import warnings
 
 import matplotlib.pyplot as plt
@@ -71,18 +73,6 @@ from szlib.zones.quantile import smooth_paths
 
 warnings.simplefilter("ignore", szlib.DataWarning)  # the verdict says it
 record = NotebookRecord("05_zones", globals())
-parameters(
-    [
-        ("q", q, ASSUMED, "share of encounters that may enter the quantile zone"),
-        ("sector", "35 deg", ASSUMED, "25 to 45 deg do as well"),
-        ("speeds pooled", "0.2 m/s slower to faster", ASSUMED, "few people walk at exactly one speed"),
-        ("the robot's zone", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
-        ("r_max", f"{r_max:g} m", PAPER, "see chapter 03"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# The zone, and its reach by direction
 samples = record.cache.encounters()
 zone = record.cache.fit_zone()
 settings = PlazaSettings()
@@ -97,8 +87,6 @@ def distance_by_direction(ellipse):
     return np.interp(degrees, np.degrees(np.arctan2(y, x)), np.hypot(x, y), period=360)
 
 
-# %% jupyter={"source_hidden": true}
-# Figure
 fig, (left, right) = plt.subplots(1, 2, figsize=(11, 3.7), layout="constrained", width_ratios=(1, 1.5))
 line = "-" if verdict == "usable" else "--"
 for ax, shown in ((left, kept.curve().T), (right, (degrees, distance_by_direction(kept)))):
@@ -122,6 +110,18 @@ widths = 100 * (bands["high"] - bands["low"])
 right.set_title(f"The same, unrolled: the interval is {widths.min():.0f} to {widths.max():.0f} cm wide")
 right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 record.figure(fig, "zone")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+parameters(
+    [
+        ("q", q, ASSUMED, "share of encounters that may enter the quantile zone"),
+        ("sector", "35 deg", ASSUMED, "25 to 45 deg do as well"),
+        ("speeds pooled", "0.2 m/s slower to faster", ASSUMED, "few people walk at exactly one speed"),
+        ("the robot's zone", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
+        ("r_max", f"{r_max:g} m", PAPER, "see chapter 03"),
+    ]
+)
 
 # %% jupyter={"source_hidden": true}
 # How this data differs from the plaza

@@ -17,7 +17,7 @@
 #     needs:
 #     - '05'
 #     exercises:
-#     - 4.3-4.5
+#     - 3.6-3.8
 #     week: 2
 # ---
 
@@ -33,7 +33,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [05](05_zones.ipynb) · next: [7 - Barriers: how fast may the robot
 # approach?](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 30 min · needs
-# [05](05_zones.ipynb) · exercises: [4.3-4.5](exercises/sheet4_certainty.ipynb#4.3-A-p-value-(10-min))
+# [05](05_zones.ipynb) · exercises: [3.6-3.8](exercises/sheet3_zones.ipynb#3.6-A-p-value-(10-min))
 #
 # **Afterwards you can** tell respect from emptiness by a null model.
 
@@ -47,7 +47,7 @@ zone_speed = 1.1  # of the zones compared [m/s]
 shifts = 20  # null models; the saved tables have 100
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 import warnings
 
 import matplotlib.pyplot as plt
@@ -63,19 +63,6 @@ from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 warnings.simplefilter("ignore", szlib.DataWarning)  # the text says which data is too small
 record = NotebookRecord("06_respect", globals())
-moved = "1 to 10 min, either way; less in a recording of less than 11 min"
-together = "5 s together within 2 m, at equal velocity"
-parameters(
-    [
-        ("shift of each person", moved, ASSUMED, "longer than a meeting, shorter than the day's changes"),
-        ("null models", shifts, ASSUMED, f"the smallest p-value is 1/{shifts + 1}"),
-        ("companions", together, MEASURED, "on people whose groups are known"),
-        ("respect zone", "g = 1/2", ASSUMED, "careful people are half as frequent as by chance at its edge"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# The people, and the same people shifted in time
 is_plaza = record.cache.is_synthetic
 tracks = respect.make_busy_plaza(seed) if is_plaza else record.cache.tracks()
 square = szlib.ATC_SQUARE if is_plaza else record.cache.find_area(tracks)
@@ -89,9 +76,6 @@ tests = {"everybody": szlib.null_test(samples, null), "strangers": szlib.null_te
 respected, found = tests["strangers"].respect, tests["strangers"].is_significant
 pairs = strangers.groupby("encounter").agg(kind=("kind", "first"), nearest=("distance", "min"))
 seen, chance = (t[t["nearest"] < r_max] for t in (pairs, others.encounters))
-
-# %% jupyter={"source_hidden": true}
-# Figure
 mine, theirs, delayed, delay = respect.shift_a_pair(tracks, strangers)
 fig, panels = plt.subplots(1, 3, figsize=(12, 3.4), layout="constrained", width_ratios=(1, 1, 1.2))
 respect.draw_pair(panels[0], mine, theirs, "As they walked")
@@ -109,6 +93,19 @@ for ax in panels[:2]:
     ax.set(xlim=(both[:, 0].min() - 0.3, both[:, 0].max() + 0.3))
     ax.set(ylim=(both[:, 1].min() - 0.3, both[:, 1].max() + 0.3))
 record.figure(fig, "pair")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+moved = "1 to 10 min, either way; less in a recording of less than 11 min"
+together = "5 s together within 2 m, at equal velocity"
+parameters(
+    [
+        ("shift of each person", moved, ASSUMED, "longer than a meeting, shorter than the day's changes"),
+        ("null models", shifts, ASSUMED, f"the smallest p-value is 1/{shifts + 1}"),
+        ("companions", together, MEASURED, "on people whose groups are known"),
+        ("respect zone", "g = 1/2", ASSUMED, "careful people are half as frequent as by chance at its edge"),
+    ]
+)
 
 # %% jupyter={"source_hidden": true}
 # How this data differs from the plaza

@@ -17,8 +17,9 @@
 #     needs:
 #     - '05'
 #     exercises:
-#     - 5.1-5.5
-#     - '6.1'
+#     - '4.2'
+#     - 5.1-5.4
+#     - '5.8'
 #     week: 3
 # ---
 
@@ -34,8 +35,10 @@
 # [Start](00_start_here.ipynb) · before: [06](06_respect.ipynb) · next: [8 - Build the controller
 # yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 1-7 · 50
 # min · needs [05](05_zones.ipynb) · exercises:
-# [5.1-5.5](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)),
-# [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) · laboratory: [13](13_laboratory.ipynb)
+# [4.2](exercises/sheet4_own_zone.ipynb#4.2-The-speed-limit-(5-min)),
+# [5.1-5.4](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)),
+# [5.8](exercises/sheet5_barriers.ipynb#5.8-In-your-own-words-(10-min)) · laboratory:
+# [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** turn a distance into a condition on the next step, and say what gamma does.
 # **Words.** *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier
@@ -52,7 +55,7 @@ gamma = 0.05
 zone_speed = 1.1  # whose zone the robot keeps [m/s], as in notebook 05
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -68,17 +71,6 @@ from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters
 record = NotebookRecord("07_barriers", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, zone_speed=zone_speed)
 zone = record.cache.ellipse()
-parameters(
-    [
-        ("robot radius", f"{settings.r_robot} m", PAPER, "a cylinder"),
-        ("margin eps", f"{settings.eps} m", PAPER, "for the error of the approximate distances"),
-        ("zone", f"{zone_speed:g} m/s", PAPER, "1.1 m/s: a little more than the robot's top speed"),
-        ("gamma", gamma, TUNED, "on the paper's four scenarios; in 2,000 other worlds: chapter 09"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 reach = zone.curve()[:, 0].max()
 keep_off = settings.r_robot + settings.eps
 v_max, steps = settings.v_max, np.linspace(0, 3, 61)
@@ -99,6 +91,17 @@ right.set(xlim=(0, 3), ylim=(0, 2), xlabel="h [m]", ylabel="speed of approach [m
 right.set_title(f"The robot slows down when h < {v_max * settings.dt / gamma:.2g} m")
 right.legend(loc="lower right", fontsize=8)
 record.figure(fig, "limit")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+parameters(
+    [
+        ("robot radius", f"{settings.r_robot} m", PAPER, "a cylinder"),
+        ("margin eps", f"{settings.eps} m", PAPER, "for the error of the approximate distances"),
+        ("zone", f"{zone_speed:g} m/s", PAPER, "1.1 m/s: a little more than the robot's top speed"),
+        ("gamma", gamma, TUNED, "on the paper's four scenarios; in 2,000 other worlds: chapter 09"),
+    ]
+)
 
 # %% [markdown]
 # ## A number first

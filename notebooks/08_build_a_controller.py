@@ -17,7 +17,9 @@
 #     needs:
 #     - '07'
 #     exercises:
-#     - 7.1-7.8
+#     - 5.5-5.7
+#     - 6.1-6.5
+#     - '7.2'
 #     week: 4
 # ---
 
@@ -33,7 +35,9 @@
 # [Start](00_start_here.ipynb) · before: [07](07_barriers.ipynb) · next: [9 - Passing a person who
 # stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 40 min ·
 # needs [07](07_barriers.ipynb) · exercises:
-# [7.1-7.8](exercises/sheet7_controller.ipynb#7.1-A-filter-on-a-road-(15-min)) · laboratory:
+# [5.5-5.7](exercises/sheet5_barriers.ipynb#5.5-A-filter-on-a-road-(15-min)),
+# [6.1-6.5](exercises/sheet6_controller.ipynb#6.1-MPC-on-a-road-(25-min)),
+# [7.2](exercises/sheet7_robot.ipynb#7.2-The-terminal-proof-(15-min)) · laboratory:
 # [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for. **Words.**
@@ -54,7 +58,7 @@ N_h = 2
 a_max = 1.0  # m/s2
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 from dataclasses import replace
 
 import daqp
@@ -73,18 +77,6 @@ zone = record.cache.ellipse()
 same = {"gamma": gamma, "N": N, "N_h": N_h, "a_max": a_max}
 paper = szlib.MPCSettings.paper(**same)
 scene = replace(szlib.SCENARIOS["corridor"], start=np.array([-4.0, -0.4, 0, 0]))
-parameters(
-    [
-        ("dt, top speed", "0.1 s, 1 m/s", PAPER, "sec. 4"),
-        ("N, N_h", f"{N}, {N_h}", PAPER, "sec. 4: steps of the plan, and those under the barrier condition"),
-        ("gamma", gamma, TUNED, "on these four scenarios: chapter 09"),
-        ("a_max", f"{a_max} m/s²", ASSUMED, "the paper gives none"),
-        ("Q, R, P", "diag(10, 10, 1, 1), I, 10 Q", ASSUMED, "the paper gives none"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 log = szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=paper))
 
 
@@ -110,6 +102,18 @@ for ax, k in zip(panels, (40, 70, 90), strict=True):
 fig.suptitle(f"Ten times a second: the best {N} steps that obey the barriers; the first one is driven")
 figures.add_shared_legend(panels)
 record.figure(fig, "goal")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+parameters(
+    [
+        ("dt, top speed", "0.1 s, 1 m/s", PAPER, "sec. 4"),
+        ("N, N_h", f"{N}, {N_h}", PAPER, "sec. 4: steps of the plan, and those under the barrier condition"),
+        ("gamma", gamma, TUNED, "on these four scenarios: chapter 09"),
+        ("a_max", f"{a_max} m/s²", ASSUMED, "the paper gives none"),
+        ("Q, R, P", "diag(10, 10, 1, 1), I, 10 Q", ASSUMED, "the paper gives none"),
+    ]
+)
 
 # %% [markdown]
 # ## The model: two steps by hand, then all of them at once

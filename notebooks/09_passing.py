@@ -17,7 +17,7 @@
 #     needs:
 #     - '07'
 #     exercises:
-#     - '6.2'
+#     - '7.1'
 #     week: 5
 # ---
 
@@ -32,7 +32,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [08](08_build_a_controller.ipynb) · next: [10 - Meeting in a narrow
 # corridor](10_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6a · 25 min · needs
-# [07](07_barriers.ipynb) · exercises: [6.2](exercises/sheet6_robot.ipynb#6.2-gamma-by-experiment-(40-min))
+# [07](07_barriers.ipynb) · exercises: [7.1](exercises/sheet7_robot.ipynb#7.1-gamma-by-experiment-(40-min))
 # · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say when the robot begins to avoid a person, and what chooses the side. **Words.**
@@ -50,7 +50,7 @@ N_h = 2
 a_max = 1.0  # m/s2
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -69,15 +69,15 @@ from szlib.workbook.record import NotebookRecord
 record = NotebookRecord("09_passing", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario, zone, paper_zone = szlib.SCENARIOS["passing"], record.cache.ellipse(), record.cache.paper_ellipse()
-scenario_runs.list_parameters(settings)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 runs = scenario_runs.drive_both(record, scenario, settings)
 log, metrics = runs.ours, runs.ours.metrics()
 side, low = zip(*((m["passing_side"], m["min_speed"]) for m in (runs.paper.metrics(), metrics)), strict=True)
 title = f"The paper's chain: {side[0]}, slows to {low[0]:.2f} m/s. Ours: {side[1]}, slows to {low[1]:.2f} m/s"
 record.figure(scenario_runs.draw_paths_and_speeds(runs, title), "chains")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+scenario_runs.list_parameters(settings)
 
 # %% [markdown]
 # ## The paper's chain, and ours

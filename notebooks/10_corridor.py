@@ -48,7 +48,7 @@ width = 4.6  # of the corridor, m
 pace = 0.5  # of the person, m/s
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -66,14 +66,6 @@ from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 record = NotebookRecord("10_corridor", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario = AtlasCell("corridor", width=width, pace=pace).scenario()
-scenario_runs.list_parameters(
-    settings,
-    ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
-    ("corridor", f"{width} m wide", ASSUMED, "the paper shows walls without numbers"),
-)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 runs = scenario_runs.drive_both(record, scenario, settings)
 log, zone = runs.ours, record.cache.ellipse()
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
@@ -82,6 +74,14 @@ sides = [run.metrics()["passing_side"] for run in (runs.paper, log)]
 lowest = max(run.metrics()["min_speed"] for run in (runs.paper, log))
 title = f"Both slow down to {lowest:.2f} m/s or less (the paper's: {sides[0]}, ours: {sides[1]})"
 record.figure(scenario_runs.draw_paths_and_speeds(runs, title), "chains")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+scenario_runs.list_parameters(
+    settings,
+    ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
+    ("corridor", f"{width} m wide", ASSUMED, "the paper shows walls without numbers"),
+)
 
 # %% [markdown]
 # ## The paper's chain, and ours
@@ -118,8 +118,11 @@ movie
 # %% jupyter={"source_hidden": true}
 # Checks
 scenario_runs.record_safety(record, runs)
-scenario_runs.record_both_claims(record, runs)
 record.check("our robot passes on the chosen side", sides[1] == settings.pass_side, f"side: {sides[1]}")
+
+# %% jupyter={"source_hidden": true}
+# The paper's claims
+scenario_runs.record_both_claims(record, runs)
 
 # %% [markdown]
 # ## A number first

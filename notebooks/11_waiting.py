@@ -18,8 +18,8 @@
 #     needs:
 #     - '10'
 #     exercises:
-#     - '6.4'
-#     - '6.6'
+#     - '7.3'
+#     - '7.5'
 #     week: 6
 # ---
 
@@ -35,8 +35,8 @@
 # [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [12 - Among people: ways, crowds,
 # and limits](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c-d · 30 min
 # · needs [10](10_corridor.ipynb) · exercises:
-# [6.4](exercises/sheet6_robot.ipynb#6.4-Predict,-then-run-(20-min)),
-# [6.6](exercises/sheet6_robot.ipynb#6.6-In-your-own-words-(10-min)) · laboratory: [13](13_laboratory.ipynb)
+# [7.3](exercises/sheet7_robot.ipynb#7.3-Predict,-then-run-(20-min)),
+# [7.5](exercises/sheet7_robot.ipynb#7.5-In-your-own-words-(10-min)) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot waits, and why it backs out of a passage, although no rule tells
 # it to.
@@ -55,7 +55,7 @@ width = 2.0  # of the passage, m
 pace = 0.5  # of the person, m/s
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -73,14 +73,6 @@ from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 
 record = NotebookRecord("11_waiting", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-scenario_runs.list_parameters(
-    settings,
-    ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
-    ("passage", f"{width} m wide", ASSUMED, "the paper shows walls without numbers"),
-)
-
-# %% jupyter={"source_hidden": true}
-# Figure
 scenes = {name: AtlasCell(name, width=width, pace=pace).scenario() for name in ("waiting", "making_room")}
 waiting, making_room = (scenario_runs.drive_both(record, scene, settings) for scene in scenes.values())
 _, between = scenes["waiting"].claims[1].check(waiting.ours)
@@ -94,6 +86,14 @@ for ax, runs, title in zip(panels, (waiting, making_room), titles, strict=True):
     scenario_runs.draw_space_time(ax, runs, title)
 figures.add_shared_legend(panels)
 record.figure(fig, "space-time")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+scenario_runs.list_parameters(
+    settings,
+    ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
+    ("passage", f"{width} m wide", ASSUMED, "the paper shows walls without numbers"),
+)
 
 # %% [markdown]
 # The horizontal axis of a panel is the time. The vertical axis is the way through the passage, which is the grey band.
@@ -136,11 +136,17 @@ movie
 # %% jupyter={"source_hidden": true}
 # Checks: waiting
 scenario_runs.record_safety(record, waiting)
-scenario_runs.record_both_claims(record, waiting)
 
 # %% jupyter={"source_hidden": true}
-# Checks: making room
+# The paper's claims: waiting
+scenario_runs.record_both_claims(record, waiting)
+
+# %% jupyter={"outputs_hidden": true, "source_hidden": true}
+# Checks: making room; the same as for waiting
 scenario_runs.record_safety(record, making_room, "making room: ")
+
+# %% jupyter={"source_hidden": true}
+# The paper's claims: making room
 scenario_runs.record_both_claims(record, making_room, "making room: ")
 
 # %% [markdown]

@@ -17,7 +17,7 @@
 #     needs:
 #     - 09
 #     exercises:
-#     - '6.5'
+#     - '7.4'
 #     week: 6
 # ---
 
@@ -32,7 +32,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [11](11_waiting.ipynb) · next: [13 - The
 # laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 50 min · needs
-# [09](09_passing.ipynb) · exercises: [6.5](exercises/sheet6_robot.ipynb#6.5-Count-the-ways-(20-min)) ·
+# [09](09_passing.ipynb) · exercises: [7.4](exercises/sheet7_robot.ipynb#7.4-Count-the-ways-(20-min)) ·
 # laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** choose settings for a robot among people and walls, and say where it will not
@@ -48,7 +48,7 @@ results = "../results"
 pace = 1.2  # of the people in the crowd [m/s]
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 from dataclasses import replace
 from heapq import heappop, heappush
 
@@ -69,18 +69,6 @@ from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters, read
 record = NotebookRecord("12_among_people", globals(), plaza_zone=True)
 zone, paper = record.cache.ellipse(), szlib.MPCSettings.paper()
 among = replace(szlib.MPCSettings.among_people(), time_limit=np.inf)
-parameters(
-    [
-        ("paper: N, N_h", f"{paper.N}, {paper.N_h}", PAPER, "0.8 s ahead; gamma = 0.05: chapter 09"),
-        ("among people: plan", f"{among.times[-1]:g} s", TUNED, f"{among.N} steps, a barrier on each"),
-        ("among people: gamma", among.gamma, TUNED, "halved and doubled in notebook 29"),
-        ("decay_price, zone_price", f"{among.decay_price:g}, {among.zone_price:g}", TUNED, "see notebook 29"),
-        ("body_gap", f"{among.body_gap:g} m", TUNED, "see notebook 29"),
-    ]
-)
-
-# %% jupyter={"source_hidden": true}
-# A crowd, and a function that drives through a scene with both settings
 rng = np.random.default_rng(seed)
 side, row = np.tile([-1, 1], 4), np.repeat(np.arange(4), 2)
 x = np.where(side < 0, 3.5, 7.5) - 0.8 * side * (row % 2) + rng.uniform(-0.4, 0.4, 8)
@@ -98,8 +86,6 @@ def drive_both(goal, people=(), walls=(), speed=0.0, title="A meeting", others=(
     return {name: drive(scene, robot, LoopSettings(until_arrival=True)) for name, robot in robots.items()}
 
 
-# %% jupyter={"source_hidden": true}
-# Figure
 streams = drive_both((11.0, 0.0), crowd, title="Two streams")
 found = {name: log.metrics() for name, log in streams.items()}
 within = {name: paper.dt * each["violations"] for name, each in found.items()}
@@ -111,6 +97,18 @@ for ax, (name, log) in zip(panels, streams.items(), strict=True):
     ax.set_title(f"{name}: {arrives}, " + (f"h < 0 for {within[name]:.1f} s" if within[name] else "h >= 0"))
 fig.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
 record.figure(fig, "crowd")
+
+# %% jupyter={"source_hidden": true}
+# Parameters, with sources
+parameters(
+    [
+        ("paper: N, N_h", f"{paper.N}, {paper.N_h}", PAPER, "0.8 s ahead; gamma = 0.05: chapter 09"),
+        ("among people: plan", f"{among.times[-1]:g} s", TUNED, f"{among.N} steps, a barrier on each"),
+        ("among people: gamma", among.gamma, TUNED, "halved and doubled in notebook 29"),
+        ("decay_price, zone_price", f"{among.decay_price:g}, {among.zone_price:g}", TUNED, "see notebook 29"),
+        ("body_gap", f"{among.body_gap:g} m", TUNED, "see notebook 29"),
+    ]
+)
 
 # %% [markdown]
 # Eight people in two streams cross the way of the robot at 1.2 m/s. They are faster than the robot, which drives

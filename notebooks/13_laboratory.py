@@ -42,7 +42,7 @@ seed = 0
 results = "../results"
 
 # %% jupyter={"source_hidden": true}
-# Imports, and the record of the run
+# Set-up, and the figure
 import numpy as np
 import pandas as pd
 from laboratory import PRESETS, Laboratory, RobotOptions, World, draw_step, explain, is_interactive
@@ -51,16 +51,7 @@ import szlib
 from szlib.workbook.record import NotebookRecord
 
 record = NotebookRecord("13_laboratory", globals(), plaza_zone=True)
-
-# %% jupyter={"source_hidden": true}
-# The zone of notebook 05
 zone = record.cache.ellipse()
-
-# %%
-Laboratory(zone=zone) if is_interactive() else None
-
-# %% jupyter={"source_hidden": true}
-# Figure: one moment, for readers without a kernel
 still = World(PRESETS["corridor"], zone)
 while still.n * still.dt < 4.0:
     still.advance()
@@ -69,8 +60,11 @@ fig.set_size_inches(9.5, 3.8)
 fig.suptitle(explain(still.steps[0]).sentence, fontsize=11)
 record.figure(fig, "still")
 
+# %%
+Laboratory(zone=zone) if is_interactive() else None
+
 # %% [markdown]
-# If you run this notebook (*Run > Run All Cells*), the laboratory appears above. The picture shows one moment of it. Choose a
+# If you run this notebook (*Run > Run All Cells*), the laboratory appears above this text. The picture shows one moment of it. Choose a
 # scene, press *play* or *step*, and move the time line to go back. Drag what you like, also while it runs: people, the tip of
 # a person's arrow, the robot, its goal, the ends of walls. The green area holds all accelerations that the robot may choose
 # now. The sentence over the picture names the *active* limit, the one that holds the robot (chapter 10): it is the orange edge. *share*
@@ -166,7 +160,7 @@ tried = {
 table = pd.DataFrame(tried).T
 table[["time", "least h", "steps not safe", "arrived"]]
 
-# %% jupyter={"source_hidden": true}
+# %% jupyter={"outputs_hidden": true, "source_hidden": true}
 # Checks
 time, low, unsafe, back = (table[name].astype(float) for name in table.columns[:4])
 held = {

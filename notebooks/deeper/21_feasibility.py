@@ -16,8 +16,6 @@
 #     asks: When is no safe choice left? Is the margin of the approximate distances enough?
 #     needs:
 #     - 08
-#     exercises:
-#     - '6.3'
 # ---
 
 # %% [markdown]
@@ -30,8 +28,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · next: [22 - The distances, audited](22_distances.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 40 min · needs [08](../08_build_a_controller.ipynb) ·
-# exercises: [6.3](../exercises/sheet6_robot.ipynb#6.3-The-terminal-proof-(15-min))
+# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 40 min · needs [08](../08_build_a_controller.ipynb)
 #
 # **Afterwards you can** say when a step has no solution, and prove when there always is one. **Words.**
 # *guard*: a check before a control is applied, that the robot can still stop before every wall.

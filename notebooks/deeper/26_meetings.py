@@ -13,7 +13,7 @@
 #     label: meetings
 #     paper: sec. 4-5
 #     aim: say in which meetings this controller is good, and in which it is bad.
-#     asks: How does the robot do in eleven standard meetings, with other gammas, widths, speeds
+#     asks: How does the robot do in standard meetings, with other gammas, widths, speeds
 #       and zones, and in crowds?
 #     needs:
 #     - '12'

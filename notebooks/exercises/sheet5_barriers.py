@@ -12,7 +12,7 @@
 # ---
 
 # %% [markdown]
-# # Sheet 5 - Barriers
+# # Sheet 5 - Barriers, and the first filter
 #
 # Write each function, then run the cell below it: it asks your function for many fresh cases and says
 # what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
@@ -20,14 +20,16 @@
 # pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [sheet 4](sheet4_certainty.ipynb) · next: [sheet
-# 6](sheet6_robot.ipynb) · [to do](../exercises/sheet5_barriers.ipynb) ·
-# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 10 min · belongs to [07](../07_barriers.ipynb)
+# [Start](../00_start_here.ipynb) · before: [sheet 4](sheet4_own_zone.ipynb) · next: [sheet
+# 6](sheet6_controller.ipynb) · [to do](../exercises/sheet5_barriers.ipynb) ·
+# [solved](../solutions/sheet5_barriers.ipynb) · 2 h 15 min · belongs to [07](../07_barriers.ipynb),
+# [08](../08_build_a_controller.ipynb)
 
 # %%
 import judges
 import matplotlib.pyplot as plt
 import numpy as np
+from judges.qp import solve_qp
 
 import szlib
 from szlib.workbook import figures
@@ -113,7 +115,99 @@ def end_margin(r_robot, length):
 judges.check("end_margin", end_margin)
 
 # %% [markdown]
-# ## 5.5 In your own words (10 min)
+# The next three tasks begin a controller; sheet 6 goes on with it. The checks of 5.5 and 5.6 drive a robot with your function
+# through worlds that you have not seen. If it does not arrive with $h \ge 0$ at every step, the check says when and why, and
+# `judges.plot("filter_1d", filter_1d, seed=..., number=...)` shows that world.
+
+# %%
+DT = 0.1  # time of a step [s]
+RADIUS = 1.0  # h = 0 at this distance from a person's centre [m]
+V_MAX = 1.0  # 5.5, 5.6: largest velocity of the robot on each axis [m/s]
+A_MAX = 2.0  # 5.7: largest acceleration of the robot on each axis [m/s2]
+N = 15  # steps of a plan
+
+# %% [markdown]
+# `solve_qp(H, f, rows, least, low, high)` gives the z with the smallest $\tfrac12 z^\top H z + f^\top z$ for
+# which `rows @ z >= least` and `low <= z <= high`. `rows` and `least` may be empty lists. It raises
+# `Infeasible` if there is none; leave that to the judge. An example: as near to 3 as 2 z >= 1 and |z| <= 2
+# allow.
+
+# %%
+solve_qp([[2.0]], [-6.0], rows=[[2.0]], least=[1.0], low=-2.0, high=2.0)
+
+# %% [markdown]
+# ## 5.5 A filter on a road (15 min)
+#
+# A robot at `x` [m] chooses its velocity $v$ [m/s], and moves by $v\,\Delta t$ in a step. It would like to
+# have the velocity `wish`. A person ahead, at `person` > `x`, walks with `velocity` (negative: towards the
+# robot). The barrier is $h = \text{person} - x - R$, and the condition (eq. 1) is $h_{next} \ge
+# (1-\gamma)\,h_{now}$. Give the velocity nearest to `wish` that satisfies it, in [-V_MAX, V_MAX]. (With one
+# number, a CBF-QP needs no solver.)
+
+
+# %%
+def filter_1d(x, wish, person, velocity, gamma):
+    """The velocity nearest to the wish [m/s] that the barrier allows."""
+    # YOUR CODE HERE
+    raise NotImplementedError()
+
+
+# %%
+judges.check("filter_1d", filter_1d)
+
+# %% [markdown]
+# ## 5.6 A filter in the plane (25 min)
+#
+# Now `x` and `wish` have shape (2,), `people` and `velocities` shape (n, 2). The barrier of person $i$ is
+# $h_i = \|\mathbf x - \mathbf p_i\| - R$, and $\mathbf n_i$ is the unit vector from the person to the robot.
+# Since $h_i$ changes by $\mathbf n_i^\top(\mathbf u - \mathbf w_i)\,\Delta t$ in a step at least, the
+# condition is satisfied if
+#
+# $$\mathbf n_i^\top (\mathbf u - \mathbf w_i) \ge -\gamma\,h_i / \Delta t \quad\text{for each person.}$$
+#
+# Give the velocity $\mathbf u$, shape (2,), with the smallest $\|\mathbf u - \text{wish}\|^2$, each of its
+# numbers in [-V_MAX, V_MAX].
+
+
+# %%
+def filter_2d(x, wish, people, velocities, gamma):
+    """The velocity (2,) nearest to the wish [m/s] that the barriers of all people allow."""
+    # YOUR CODE HERE
+    raise NotImplementedError()
+
+
+# %%
+judges.check("filter_2d", filter_2d)
+
+# %% [markdown]
+# ## 5.7 The states of a plan (25 min)
+#
+# From here on the robot has inertia: its input is an acceleration $u$ [m/s2], and
+#
+# $$\mathbf s_{k+1} = A\,\mathbf s_k + B\,u_k,\quad \mathbf s = \begin{pmatrix}x\\v\end{pmatrix},\quad
+#   A = \begin{pmatrix}1&\Delta t\\0&1\end{pmatrix},\quad
+#   B = \begin{pmatrix}\Delta t^2/2\\\Delta t\end{pmatrix}.$$
+#
+# A *condensed* MPC has no states among its unknowns: they are computed from the inputs. Give the matrix $M$,
+# shape (2 N, 2 + N), for which
+#
+# $$(x_1, v_1, x_2, v_2, \dots, x_N, v_N) = M\,(x_0, v_0, u_0, \dots, u_{N-1}).$$
+#
+# The check puts your matrix into an MPC of its own, for several N.
+
+
+# %%
+def predict(N):
+    """The matrix (2 N, 2 + N) that gives all states of a plan."""
+    # YOUR CODE HERE
+    raise NotImplementedError()
+
+
+# %%
+judges.check("predict", predict)
+
+# %% [markdown]
+# ## 5.8 In your own words (10 min)
 #
 # A colleague proposes to drop gamma and to require h >= 0 at the next step only. When is the robot still
 # safe, when not, and what does gamma cost? Use the barrier row of 5.3. Write five to eight sentences.

@@ -12,7 +12,7 @@
 # ---
 
 # %% [markdown]
-# # Sheet 3 - From samples to a zone
+# # Sheet 3 - From samples to a zone, and how sure
 #
 # Write each function, then run the cell below it: it asks your function for many fresh cases and says
 # what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
@@ -21,9 +21,9 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 2](sheet2_outliers.ipynb) · next: [sheet
-# 4](sheet4_certainty.ipynb) · [to do](../exercises/sheet3_zones.ipynb) ·
-# [solved](../solutions/sheet3_zones.ipynb) · 3 h 35 min · belongs to [04](../04_hull.ipynb),
-# [05](../05_zones.ipynb)
+# 4](sheet4_own_zone.ipynb) · [to do](../exercises/sheet3_zones.ipynb) ·
+# [solved](../solutions/sheet3_zones.ipynb) · 1 h 55 min · belongs to [04](../04_hull.ipynb),
+# [05](../05_zones.ipynb), [06](../06_respect.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.
@@ -36,7 +36,6 @@ import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
-import szlib
 from szlib.workbook import figures
 
 # %% [markdown]
@@ -116,53 +115,119 @@ def triangle_ellipse(triangle):
 judges.check("triangle_ellipse", triangle_ellipse)
 
 # %% [markdown]
-# ## 3.4 A zone of your own (an evening, 150 min)
+# ## 3.4 The quantile zone in one direction (10 min)
 #
-# `samples` are the encounters of a fresh plaza: columns `encounter`, `los_angle` [rad], `distance`
-# [m], `speed` of the reference pedestrian [m/s]. Everybody keeps out of everybody's zone, but one in
-# a hundred walks right through it. Find the zone of people who walk at `speed` [m/s], as a `szlib.Ellipse` in the
-# person's frame: centre and semi-axes within 10 cm and, where the semi-axes differ, the angle within 0.2 rad.
-# Width, length, centre, angle, speed, and whether zones grow or shrink with speed are drawn anew each
-# time, each for itself. Of szlib you may use `szlib.Ellipse` only.
+# `nearest` holds how near people came in one direction, one number for each encounter [m]. The
+# quantile zone ends at the least approach such that at least a share `q` of the encounters came as
+# near as that, or nearer. Give this radius [m]: always the approach of somebody, never a number in
+# between.
 
 
 # %%
-def my_zone(samples, speed):
-    """The zone at this speed [m/s], a szlib.Ellipse in the person's frame."""
+def quantile_radius(nearest, q):
+    """Radius of the quantile zone in this direction [m]."""
     ### BEGIN SOLUTION
-    close = samples[(samples["distance"] <= 2) & samples["speed"].between(speed - 0.2, speed + 0.2)]
-    edge = []
-    for theta in np.radians(np.arange(-180, 180, 10)):
-        off = np.angle(np.exp(1j * (close["los_angle"] - theta)))
-        approach = close[np.abs(off) < np.radians(12)].groupby("encounter")["distance"].min()
-        edge.append(np.quantile(approach, 0.07) * np.array([np.cos(theta), np.sin(theta)]))
-    x, y = np.transpose(edge)
-    terms = np.column_stack([x * x, x * y, y * y, x, y])
-    p, q, r, s, t = np.linalg.lstsq(terms, np.ones(len(x)))[0]
-    form = np.array([[p, q / 2], [q / 2, r]])
-    center = -np.linalg.solve(form, [s, t]) / 2
-    values, vectors = np.linalg.eigh(form / (1 + center @ form @ center))
-    a, b = 1 / np.sqrt(values)
-    return szlib.Ellipse(center, (a, b), np.arctan2(vectors[1, 0], vectors[0, 0]))
+    return np.sort(nearest)[int(np.ceil(q * len(nearest))) - 1]
     ### END SOLUTION
 
 
 # %%
-judges.check("my_zone", my_zone)
+judges.check("quantile_radius", quantile_radius)
 
 # %% [markdown]
-# ## 3.5 In your own words (10 min)
+# ## 3.5 Why the hull shrinks (15 min)
 #
-# Your zone of 3.4 is within 10 cm on synthetic plazas. Name three reasons why it may be farther off in a
-# real hall, and for each of them what you would look at in the data to notice it. Write five to eight
-# sentences.
+# People keep out of a zone, and each a little farther: by a distance that is exponentially
+# distributed with mean `mean` [m], each independently of the others. How far from the zone's edge is
+# the nearest of `n` people, on average [m]?
+
+
+# %%
+def expected_nearest(mean, n):
+    """Mean distance of the nearest of n people from the edge of the zone [m]."""
+    ### BEGIN SOLUTION
+    return mean / n
+    ### END SOLUTION
+
+
+# %%
+judges.check("expected_nearest", expected_nearest)
+
+# %% [markdown]
+# **Solution.** All n keep more than x with probability exp(-x / mean)^n = exp(-n x / mean). So the
+# nearest is exponential again, with mean / n. On a real day there is no sharp edge behind it, and the
+# hull goes on shrinking: that is why chapter 06 looks at a quantile, which settles.
+
+# %%
+counts = np.geomspace(10, 1000, 20).astype(int)
+drawn = [np.random.default_rng(0).exponential(0.3, (400, n)) for n in counts]
+ax = figures.get_axes(None, size=(6, 3.6))
+ax.plot(counts, [each.min(axis=1).mean() for each in drawn], "o", color=figures.BLUE, label="nearest of n")
+ax.plot(
+    counts,
+    [np.quantile(d, 0.05, axis=1).mean() for d in drawn],
+    "s",
+    color=figures.ORANGE,
+    label="5 % quantile",
+)
+ax.set(xscale="log", yscale="log", xlabel="encounters n", ylabel="from the zone's edge [m]")
+ax.set_title("An extreme goes on shrinking, a quantile settles")
+ax.legend()
+plt.show()
+
+# %% [markdown]
+# ## 3.6 A p-value (10 min)
+#
+# `observed` says how rarely people were near each other, and the array `null` what the same number is
+# in many null models, where people do not react to each other. Large values speak for respect. How
+# likely is a value as large as the observed one, or larger, if people do not react? The data then is
+# one draw among all the others.
+
+
+# %%
+def p_value(observed, null):
+    """One-sided p-value, a share in (0, 1]."""
+    ### BEGIN SOLUTION
+    return (1 + (null >= observed).sum()) / (1 + len(null))
+    ### END SOLUTION
+
+
+# %%
+judges.check("p_value", p_value)
+
+# %% [markdown]
+# ## 3.7 The null model (15 min)
+#
+# The null model keeps each person's path and moves it in time. Samples have times `t` [s], from 0 to
+# `period`, and belong to `person` (its number, from 0), both of shape (n,); `shift` says by how much
+# each person is moved, one number a person [s], of either sign. Give the new times. Who is moved past
+# the end of the recording comes in at its beginning.
+
+
+# %%
+def shifted(t, person, shift, period):
+    """New times in [0, period) [s], shape (n,)."""
+    ### BEGIN SOLUTION
+    return (t + shift[person]) % period
+    ### END SOLUTION
+
+
+# %%
+judges.check("shifted", shifted)
+
+# %% [markdown]
+# ## 3.8 In your own words (10 min)
+#
+# The null model of people who ignore each other is rejected with p = 0.01. A newspaper writes that with a
+# probability of 99 % people respect each other's zone. Correct the sentence, and say what the number does
+# and does not support. Write five to eight sentences.
 
 # %% [markdown]
 # **Rubric** (10 points; a person grades this answer)
 #
 # | points | for |
 # |---|---|
-# | 3 | three different reasons, such as few encounters in a direction, groups, walls, errors of tracking, culture or crowding |
-# | 3 | for each reason an observation in the data that would show it |
-# | 2 | bias is told from noise: which of the reasons more data would not mend |
-# | 2 | the choice of quantile and speed range of one's own method is discussed |
+# | 3 | p is the probability of data at least as extreme if the null model were true, not that of the null model |
+# | 3 | what is rejected: independent times on the same paths; other reasons than respect can reject it as well |
+# | 2 | the size of the effect is another question than p |
+# | 2 | p cannot be less than 1 / (1 + number of shifts) |

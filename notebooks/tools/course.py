@@ -49,11 +49,11 @@ LABORATORY, FIRST_SCENE = "13", "07"
 
 TASKS: list[tuple[str, tuple[str, ...]]] = [
     ("Tracks, encounters, and which of them to believe", ("1.1-1.5", "2.1-2.5")),
-    ("From samples to a zone; respect or emptiness", ("3.1-3.3", "4.1-4.5")),
-    ("A zone of your own, and a barrier around it", ("3.4-3.5", "6.1")),
-    ("A controller of your own", ("5.1-5.5", "7.1-7.3")),
-    ("MPC with barriers, and the first meetings", ("7.4-7.8",)),
-    ("The robot yields, and drives among people", ("6.2-6.6",)),
+    ("From samples to a zone; respect or emptiness", ("3.1-3.8",)),
+    ("A zone of your own, and a barrier around it", ("4.1-4.3",)),
+    ("A controller of your own", ("5.1-5.8",)),
+    ("MPC with barriers, and the first meetings", ("6.1-6.5",)),
+    ("The robot yields, and drives among people", ("7.1-7.5",)),
 ]
 """Topic, and tasks of the exercise sheets, of each week; its chapters say so themselves."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [

@@ -1,20 +1,22 @@
-"""Make slides of the executed copies of the notebooks, and one folder of their figures: `make slides`.
+"""Make slides and handouts of the executed copies of the notebooks, and one folder of their figures: `make slides`.
 
     python notebooks/tools/slides.py                       all notebooks but the map, 00, to results/slides
     python notebooks/tools/slides.py 07 08                 some of them
-    python notebooks/tools/slides.py --reveal FOLDER       decks that need no network
 
 The rules: the title and each heading `##` start a slide. Code is shown if it is visible in the notebook and has at
 most 12 lines. Hidden cells, and longer ones, show their figures and sentences only. The text of a fold appears at a
-key press. The navigation is a note for the speaker. What does not fit on a slide goes on below it.
+key press. The navigation is a note for the speaker. A slide that is half full ends before the next idea: a paragraph
+that begins in bold, such as a question. What does not fit goes on below it.
 
-A deck loads reveal.js from unpkg.com, unless `--reveal` names a folder with a copy of it (`npm pack reveal.js@4.6.1`,
-or its archive from GitHub, unpacked), which then becomes part of each deck.
+A handout is the chapter as PDF: hidden code and the text of folds, which are the answers, are left out. Chromium prints
+it, by nbconvert's webpdf; where there is none, a line says so. Decks hold reveal.js (reveal.js-4.6.1, MIT licence) and
+need no network.
 """
 
 import argparse
 import math
 import re
+import shutil
 import struct
 from base64 import b64decode
 from collections.abc import Iterator
@@ -23,7 +25,7 @@ from pathlib import Path
 
 import nbformat
 from jinja2 import FileSystemLoader
-from nbconvert import SlidesExporter
+from nbconvert import SlidesExporter, WebPDFExporter
 from nbconvert.filters.markdown_mistune import MarkdownWithMath
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
@@ -32,7 +34,8 @@ from szlib.core.files import claim_folder, write_file
 from szlib.workbook import folders
 from szlib.workbook.report import MathRenderer
 
-REVEAL = "https://unpkg.com/reveal.js@4.6.1"
+REVEAL = Path(__file__).with_suffix("") / "reveal.js-4.6.1"
+BROWSERS = "chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge"
 OUT = Path(__file__).parents[2] / "results" / "slides"
 MAX_CODE, MAX_ROWS, MAX_TEXT = 12, 8, 12
 """Lines of code, rows of a table, and lines of printed text that a slide shows."""
@@ -40,6 +43,7 @@ LINES, WIDTH = 20, 95
 """Lines of text on a slide, and letters in a line."""
 SLIDE, FIGURE, PIXELS = 1200, 560, 33
 """Width of a slide, largest height of a figure, and height of a line [pixels]."""
+MARGINS = "top", "bottom", "left", "right"
 NAVIGATION = "**Afterwards you can**"
 FOLD = re.compile(r"<details>\s*<summary>(.*?)</summary>(.*?)</details>", re.DOTALL)
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|#)([^)]*)\)")
@@ -56,7 +60,7 @@ def make_slides(notebook: NotebookNode) -> NotebookNode:
         height = 0.0 if kind == "notes" else measure_height(part)
         if kind == "slide":
             heading, used = part.source.splitlines()[0].lstrip("# "), 0.0
-        elif used + height > LINES:
+        elif used + height > LINES or (used > LINES / 2 and is_idea(part)):
             slides.cells.append(_tag(new_markdown_cell(f"## {heading} (continued)"), "subslide"))
             used = measure_height(slides.cells[-1])
             kind = "-"  # a slide of its own is a key press already
@@ -65,6 +69,11 @@ def make_slides(notebook: NotebookNode) -> NotebookNode:
     for number, cell in enumerate(slides.cells):
         cell.id = f"slide-{number}"
     return slides
+
+
+def is_idea(part: NotebookNode) -> bool:
+    """Whether a part is a paragraph that begins in bold."""
+    return part.cell_type == "markdown" and part.source.startswith("**")
 
 
 def _tag(cell: NotebookNode, kind: str) -> NotebookNode:
@@ -168,55 +177,90 @@ def list_figures(notebook: NotebookNode, stem: str) -> dict[str, bytes]:
     return figures
 
 
-def export(slides: NotebookNode, stem: str, stems: set[str], reveal: str | Path = REVEAL) -> str:
-    """The deck as HTML; links lead to the decks `stems`, and a folder `reveal` becomes part of it."""
+def render(text: str, stems: set[str]) -> str:
+    """The HTML of a Markdown text with MathML and pictures in it; links lead to the decks `stems`."""
+    targets = {link: Path(link[1].partition("#")[0]).stem for link in LINK.findall(text)}
+    for (label, path), target in targets.items():
+        link = f"[{label}]({target}.html)" if target in stems else label
+        text = text.replace(f"[{label}]({path})", link)
+    renderer = MathRenderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
+    return MarkdownWithMath(renderer=renderer).render(text)
 
-    def render(text: str) -> str:
-        targets = {link: Path(link[1].partition("#")[0]).stem for link in LINK.findall(text)}
-        for (label, path), target in targets.items():
-            link = f"[{label}]({target}.html)" if target in stems else label
-            text = text.replace(f"[{label}]({path})", link)
-        renderer = MathRenderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
-        return MarkdownWithMath(renderer=renderer).render(text)
 
+def export(slides: NotebookNode, stem: str, stems: set[str]) -> str:
+    """The deck as HTML with reveal.js in it; links lead to the decks `stems`."""
     exporter = SlidesExporter(
         extra_loaders=[FileSystemLoader(Path(__file__).with_suffix(""))],
         extra_template_basedirs=[],  # not the current folder, which is the default
         template_file="deck.html.j2",
-        reveal_url_prefix=REVEAL,
+        reveal_url_prefix=REVEAL.name,
         reveal_theme="white",
         exclude_input_prompt=True,
         exclude_output_prompt=True,
     )
-    exporter.register_filter("markdown2html", render)
+    exporter.register_filter("markdown2html", lambda text: render(text, stems))
     html, _ = exporter.from_notebook_node(slides, resources={"metadata": {"name": stem}})
-    return embed_reveal(html, Path(reveal)) if reveal != REVEAL else html
+    return embed_reveal(html)
 
 
-def embed_reveal(html: str, folder: Path) -> str:
-    """The deck with the files of reveal.js from a `folder` in it; its theme then has the fonts of the system."""
+def embed_reveal(html: str) -> str:
+    """The deck with the files of reveal.js in it; its theme then has the fonts of the system."""
 
     def read(path: str) -> str:
-        text = (folder / path).read_text(encoding="utf-8")
+        text = (REVEAL / Path(path).name).read_text(encoding="utf-8")
         return re.sub(r"@import [^;]+;", "", text).replace("</script", "<\\/script")
 
     html = re.sub(
-        rf'<link [^>]*href="{REVEAL}/([^"]+)"[^>]*>',
-        lambda m: f"<style>{read(m[1])}</style>",
-        html,
+        rf'<link [^>]*href="{REVEAL.name}/([^"]+)"[^>]*>', lambda m: f"<style>{read(m[1])}</style>", html
     )
     return re.sub(
-        rf'<script src="{REVEAL}/([^"]+)"></script>', lambda m: f"<script>{read(m[1])}</script>", html
+        rf'<script src="{REVEAL.name}/([^"]+)"></script>', lambda m: f"<script>{read(m[1])}</script>", html
     )
+
+
+class HandoutExporter(WebPDFExporter):
+    """nbconvert's webpdf with the Chromium of this machine, whose pages ask no server."""
+
+    def run_playwright(self, html: str) -> bytes:
+        """The page as PDF."""
+        from playwright.sync_api import sync_playwright
+
+        with sync_playwright() as driver:
+            browser = driver.chromium.launch(executable_path=find_browser(), args=["--no-sandbox"])
+            page = browser.new_page(offline=True)
+            page.set_content(html)
+            content = page.pdf(format="A4", print_background=True, margin=dict.fromkeys(MARGINS, "12mm"))
+            browser.close()
+        return content
+
+
+def find_browser() -> str | None:
+    """The path of a Chromium on this machine."""
+    return next((path for name in BROWSERS if (path := shutil.which(name))), None)
+
+
+def make_handout(notebook: NotebookNode, stem: str) -> bytes:
+    """The chapter as PDF, without hidden code, checks and answers."""
+    handout = deepcopy(notebook)
+    for cell in handout.cells:
+        if cell.cell_type == "markdown":
+            cell.source = FOLD.sub("", cell.source)
+            continue
+        if is_hidden := cell.metadata.get("jupyter", {}).get("source_hidden", False):
+            cell.outputs = [each for each in cell.outputs if each.output_type != "stream"]
+        cell.metadata["transient"] = {"remove_source": is_hidden}
+        for data in (each.data for each in cell.outputs if "text/markdown" in each.get("data", {})):
+            data["text/markdown"] = FOLD.sub("", data["text/markdown"])
+    exporter = HandoutExporter(exclude_input_prompt=True, exclude_output_prompt=True, embed_images=True)
+    exporter.register_filter("markdown2html", lambda text: render(text, set()))
+    content, _ = exporter.from_notebook_node(handout, resources={"metadata": {"name": stem}})
+    return content
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Write the decks and the figures that the command line names."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", help="numbers of notebooks; default: all")
-    parser.add_argument(
-        "--reveal", default=REVEAL, help="folder with reveal.js, for decks that need no network"
-    )
     parser.add_argument("--out", type=Path, default=OUT)
     given = parser.parse_args(arguments)
     (claim_folder(given.out, "slides of the notebooks") / "figures").mkdir(exist_ok=True)
@@ -229,9 +273,12 @@ def main(arguments: list[str] | None = None) -> None:
         figures = list_figures(notebook, source.stem)
         for name, content in figures.items():
             write_file(given.out / "figures" / name, content, durable=False)
-        html = export(make_slides(notebook), source.stem, stems, given.reveal)
+        html = export(make_slides(notebook), source.stem, stems)
         write_file(given.out / f"{source.stem}.html", html, durable=False)
-        print(f"{given.out / source.stem}.html, {len(figures)} figures")
+        if has_browser := find_browser() is not None:
+            write_file(given.out / f"{source.stem}.pdf", make_handout(notebook, source.stem), durable=False)
+        made = "deck and handout" if has_browser else "deck; no handout, since there is no Chromium"
+        print(f"{given.out / source.stem}: {made}, {len(figures)} figures")
 
 
 if __name__ == "__main__":

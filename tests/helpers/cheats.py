@@ -11,7 +11,7 @@ import textwrap
 
 from szlib.workbook import folders
 
-SOLVED = str(folders.NOTEBOOKS / "solutions" / "sheet1_tracks.py")
+SOLVED = str(folders.NOTEBOOKS / "solutions" / "sheet4_own_zone.py")
 JUDGES = str(folders.NOTEBOOKS / "exercises")
 
 
@@ -71,12 +71,12 @@ NAIVE = [
 
 INTERNALS = [
     speed_limit(
-        "from judges.sheets import SHEETS\nreturn SHEETS['sheet6_robot'][0].solution(h, gamma, dt, v)"
+        "from judges.sheets import SHEETS\nreturn SHEETS['sheet4_own_zone'][1].solution(h, gamma, dt, v)"
     ),
-    speed_limit("import judges\nreturn judges.sheet6_robot._limit(h, gamma, dt, v)"),
+    speed_limit("import judges\nreturn judges.robot._limit(h, gamma, dt, v)"),
     (
         "largest_gamma",
-        "from judges.sheet6_robot import _largest\ndef largest_gamma(zone, a_max, gammas):\n"
+        "from judges.robot import _largest\ndef largest_gamma(zone, a_max, gammas):\n"
         "    return _largest(zone, a_max, gammas)\n",
     ),
     speed_limit(
@@ -84,7 +84,7 @@ INTERNALS = [
         import sys
         sys.meta_path.pop(0)
         sys.path.insert(0, {JUDGES!r})
-        from judges.sheet6_robot import _limit
+        from judges.robot import _limit
         return _limit(h, gamma, dt, v)
         """
     ),

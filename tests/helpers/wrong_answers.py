@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 import szlib
-from szlib.workbook import folders
 from szlib.zones import outliers
+
+from .exercises import SOLUTIONS, TASKS, cells, defined
 
 Answer = Callable[..., Any]
 
@@ -916,39 +917,30 @@ CHANGES: dict[str, list[tuple[str, str, str]]] = {
         ("expected numbers, shape (2,)", "0.05 * a_max, 8", "0.05 * a_max"),
     ],
 }
-"""Sheet 7: what the judge must say, and the part of the solution that is replaced, by what."""
+"""A controller: what the judge must say, and the part of the solution that is replaced, by what."""
 
 
-def change(source: str, name: str, old: str, new: str) -> Answer:
-    """The function `name` of the solution's `source`, with one part of it replaced."""
-    start = source.index(f"def {name}(")
-    body = source[start : source.index("### END SOLUTION", start)]
-    if old not in body:
+def change(name: str, old: str, new: str) -> Answer:
+    """The solution of the task `name`, with one part of it replaced."""
+    sheet = TASKS[name][0]
+    (source,) = [
+        cell.source
+        for cell in cells(SOLUTIONS / f"{sheet}.py")
+        if cell.source.startswith(f"def {name}(")
+    ]
+    if old not in source:
         raise ValueError(f"{name} has no {old!r} to replace")
-    found: dict[str, Any] = {"__name__": "sheet"}
-    exec(
-        source[: source.index("# %% [markdown]\n# ## 7.1")].replace(
-            "import matplotlib.pyplot as plt\n", ""
-        ),
-        found,
-    )
-    for each in ("predict", name):
-        code = source[
-            (at := source.index(f"def {each}(")) : source.index("### END SOLUTION", at)
-        ]
-        exec(code if each != name else body.replace(old, new), found)
+    found = dict(defined(sheet, SOLUTIONS))
+    exec(source.replace(old, new), found)
     answer: Answer = found[name]
     return answer
 
 
-SOURCE = (folders.NOTEBOOKS / "solutions" / "sheet7_controller.py").read_text(
-    encoding="utf-8"
-)
-SHEET7 = {
-    name: [(message, change(SOURCE, name, old, new)) for message, old, new in changes]
+CONTROLLER = {
+    name: [(message, change(name, old, new)) for message, old, new in changes]
     for name, changes in CHANGES.items()
 }
 
 WRONG: dict[str, list[tuple[str, Answer]]] = {
-    **SHEET1, **SHEET2, **SHEET3, **SHEET4, **SHEET5, **SHEET6, **SHEET7,
+    **SHEET1, **SHEET2, **SHEET3, **SHEET4, **SHEET5, **SHEET6, **CONTROLLER,
 }  # fmt: skip

@@ -51,12 +51,40 @@ def test_each_week_has_goals_misconceptions_of_each_chapter_and_questions(week):
     number, _, text = week
     assert "**Goals.**" in text
     rows = re.findall(
-        r"^\| (?!misconception|---)(.+) \| (.+) \| (.+) \|$", text, flags=re.M
+        r"^\| (?!misconception|---)([^|]+) \| ([^|]+) \| ([^|]+) \|$", text, flags=re.M
     )
     assert {where[:2] for _, _, where in rows} == set(
         course.weeks(course.pages())[int(number) - 1][1]
     )
     assert 2 <= len(re.findall(r"^\d\. \*.+\?\*", text, flags=re.M)) <= 3
+
+
+@pytest.mark.parametrize("week", WEEKS, ids=lambda week: week[0])
+def test_each_week_has_a_plan_of_90_minutes(week):
+    """Minutes follow each other; a scene is a section of a chapter of the week, a task or the project."""
+    number, _, text = week
+    chapters = course.weeks(course.pages())[int(number) - 1][1]
+    rows = re.findall(
+        r"^\| (\d+)-(\d+) \| ([^|]+) \| ([^|]+\?[^|]*) \| ([^|]+) \|$", text, re.M
+    )
+    ends = [(int(start), int(end)) for start, end, *_ in rows]
+    assert [start for start, _ in ends] == [0, *(end for _, end in ends[:-1])]
+    assert ends[-1][1] == 90
+    headings = {
+        f"{page.number}, {line.lstrip('# ')}"
+        for page in course.pages()
+        for prose in page.prose
+        for line in prose.splitlines()
+        if line.startswith("##") and page.number in chapters
+    }
+    tasks = {
+        task
+        for part in course.TASKS[int(number) - 1][1]
+        for task in course.expand(part)
+    }
+    others = {f"sheet {task[0]}, task {task}" for task in tasks}
+    others |= {"00, the two pictures", "the project"}
+    assert {place for _, _, place, *_ in rows} <= headings | others
 
 
 def test_links_lead_somewhere_and_tasks_exist():
@@ -78,17 +106,10 @@ def test_links_lead_somewhere_and_tasks_exist():
 
 
 def test_commands_exist():
-    sheets, slides = (
-        folders.NOTEBOOKS / "tools" / f"{name}.py" for name in ("sheets", "slides")
-    )
-    assert '"--class"' in sheets.read_text(
-        "utf-8"
-    ) and '"--reveal"' in slides.read_text("utf-8")
+    sheets = folders.NOTEBOOKS / "tools" / "sheets.py"
+    assert '"--class"' in sheets.read_text("utf-8")
     makefile = (folders.NOTEBOOKS.parent / "Makefile").read_text("utf-8")
-    assert "$(SLIDES_FLAGS)" in makefile
     assert set(re.findall(r"`make (\w+)", GUIDE)) <= set(
         re.findall(r"^(\w+):", makefile, flags=re.M)
     )
-    version = re.findall(r"reveal\.js@([\d.]+)", slides.read_text("utf-8"))
-    assert f"reveal.js@{version[0]} && tar xf reveal.js-{version[0]}.tgz" in GUIDE
     assert f"of at most\n   {_tool('slides').MAX_CODE} lines" in GUIDE

@@ -7,13 +7,14 @@ answer_program    that process: limits of time, memory, files, modules
 process           a program that cannot keep its caller waiting
 task              one task: it draws cases and compares the results
 texts.toml        minutes, hints and messages of all tasks
-sheet1_tracks     velocity, line of sight, attentional space, sampling at 1 Hz
-sheet2_outliers   complementary coordinates, nearest approaches, LOF's blind spot
-sheet3_zones      a slice, its zone, the smallest ellipse, a zone of your own
-sheet4_certainty  quantiles, extremes, p-values, the null model
-sheet5_barriers   distances to zones and walls, the barrier row, the margin
-sheet6_robot      speed limit, gamma by experiment, the terminal proof, predictions, distinct ways
-sheets            the tasks of all sheets
+tracks            tasks: velocity, line of sight, attentional space, sampling at 1 Hz
+outliers          tasks: complementary coordinates, nearest approaches, LOF's blind spot
+zones             tasks: a slice, its zone, the smallest ellipse, a zone of your own
+certainty         tasks: quantiles, extremes, p-values, the null model
+barriers          tasks: distances to zones and walls, the barrier row, the margin
+robot             tasks: speed limit, gamma by experiment, the terminal proof, predictions, distinct ways
+controller        tasks: filters (CBF-QP), the states of a plan, MPC, MPC-CBF
+sheets            which tasks each sheet has: those of one week, or of a part of it
 """
 
 from importlib import import_module

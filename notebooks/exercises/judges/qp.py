@@ -1,4 +1,4 @@
-"""A quadratic program, as the answers of sheet 7 and their judges solve it."""
+"""A quadratic program, as the answers of sheets 5 and 6 and their judges solve it."""
 
 from __future__ import annotations
 

@@ -11,11 +11,24 @@ from szlib.core.errors import DataError
 from .answers import Answer
 from .task import ESSAY_MINUTES, Args, Task, Verdict
 
-_SHEETS = "sheet1_tracks sheet2_outliers sheet3_zones sheet4_certainty sheet5_barriers sheet6_robot sheet7_controller"
-SHEETS: dict[str, tuple[Task, ...]] = {
-    name: import_module(f".{name}", __package__).TASKS for name in _SHEETS.split()
+_MODULES = "tracks outliers zones certainty barriers robot controller"
+TASKS: dict[str, Task] = {
+    task.name: task for module in _MODULES.split() for task in import_module(f".{module}", __package__).TASKS
 }
-"""The tasks of each sheet, in order."""
+"""All tasks by name."""
+_SHEETS = {
+    "sheet1_tracks": "velocity line_of_sight in_space one_hertz",
+    "sheet2_outliers": "complementary nearest found blind_spot",
+    "sheet3_zones": "crossing zone_radius triangle_ellipse quantile_radius expected_nearest p_value shifted",
+    "sheet4_own_zone": "my_zone speed_limit",
+    "sheet5_barriers": "focal_distance wall_distance barrier_row end_margin filter_1d filter_2d predict",
+    "sheet6_controller": "mpc_1d mpc_cbf_1d mpc_cbf_2d tuned",
+    "sheet7_robot": "largest_gamma next_plan prediction count_ways",
+}
+SHEETS: dict[str, tuple[Task, ...]] = {
+    sheet: tuple(TASKS[name] for name in names.split()) for sheet, names in _SHEETS.items()
+}
+"""The tasks of each sheet, in order. A sheet belongs to one week, so that it can be handed out whole."""
 
 
 def judge(name: str, packed: dict[str, str], seeds: Iterable[int]) -> Iterator[Verdict]:
@@ -40,7 +53,7 @@ def case(name: str, seed: int, number: int) -> Args:
 
 
 def plot(name: str, answer: Callable[..., Any], *, seed: int, number: int) -> None:
-    """Draw what the answer does in one world of a check of sheet 7."""
+    """Draw what the answer does in one world of a check in closed loop."""
     task = find_task(name)
     if task.plot is None:
         raise DataError(f"{name} has no worlds to draw; judges.case gives its arguments")
@@ -78,7 +91,6 @@ def sheet_minutes(sheet: str) -> int:
 
 def find_task(name: str) -> Task:
     """The task of this name."""
-    tasks = {task.name: task for sheet in SHEETS.values() for task in sheet}
-    if name not in tasks:
-        raise DataError(f"there is no task {name!r}; the tasks are {', '.join(tasks)}")
-    return tasks[name]
+    if name not in TASKS:
+        raise DataError(f"there is no task {name!r}; the tasks are {', '.join(TASKS)}")
+    return TASKS[name]

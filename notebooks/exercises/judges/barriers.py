@@ -1,4 +1,4 @@
-"""Sheet 5: distances to a zone and to a wall, the barrier row, the margin at the end of a wall."""
+"""Tasks: distances to a zone and to a wall, the barrier row, the margin at the end of a wall."""
 
 from __future__ import annotations
 

@@ -12,19 +12,20 @@
 # ---
 
 # %% [markdown]
-# # Sheet 7 - A controller
+# # Sheet 6 - A controller
 #
-# You write a controller in six steps: a filter for one velocity (CBF-QP), a plan (MPC), and both together
-# (MPC-CBF), first on a road, then in the plane. Each check drives a robot with your function through worlds
+# You go on with the controller of sheet 5: a plan (MPC), and plan and barrier together (MPC-CBF), first on a
+# road, then in the plane. Each check drives a robot with your function through worlds
 # that you have not seen, with people who stand and walk. The robot must arrive, with $h \ge 0$ at every
 # step and inputs within their limits. If it does not, the check says when and why, and
-# `judges.plot("filter_1d", filter_1d, seed=..., number=...)` shows that world. `judges.hint("filter_1d", 1)`
+# `judges.plot("mpc_1d", mpc_1d, seed=..., number=...)` shows that world. `judges.hint("mpc_1d", 1)`
 # prints a hint.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [sheet 6](sheet6_robot.ipynb) · [to
-# do](../exercises/sheet7_controller.ipynb) · [solved](../solutions/sheet7_controller.ipynb) · 3 h 20 min ·
-# belongs to [08](../08_build_a_controller.ipynb)
+# [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · next: [sheet
+# 7](sheet7_robot.ipynb) · [to do](../exercises/sheet6_controller.ipynb) ·
+# [solved](../solutions/sheet6_controller.ipynb) · 2 h 15 min · belongs to
+# [08](../08_build_a_controller.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.
@@ -40,8 +41,7 @@ from judges.qp import solve_qp
 
 DT = 0.1  # time of a step [s]
 RADIUS = 1.0  # h = 0 at this distance from a person's centre [m]
-V_MAX = 1.0  # 7.1, 7.2: largest velocity of the robot on each axis [m/s]
-A_MAX = 2.0  # from 7.3 on: largest acceleration of the robot on each axis [m/s2]
+A_MAX = 2.0  # largest acceleration of the robot on each axis [m/s2]
 N = 15  # steps of a plan
 
 # %% [markdown]
@@ -54,78 +54,12 @@ N = 15  # steps of a plan
 solve_qp([[2.0]], [-6.0], rows=[[2.0]], least=[1.0], low=-2.0, high=2.0)
 
 # %% [markdown]
-# ## 7.1 A filter on a road (15 min)
-#
-# A robot at `x` [m] chooses its velocity $v$ [m/s], and moves by $v\,\Delta t$ in a step. It would like to
-# have the velocity `wish`. A person ahead, at `person` > `x`, walks with `velocity` (negative: towards the
-# robot). The barrier is $h = \text{person} - x - R$, and the condition (eq. 1) is $h_{next} \ge
-# (1-\gamma)\,h_{now}$. Give the velocity nearest to `wish` that satisfies it, in [-V_MAX, V_MAX]. (With one
-# number, a CBF-QP needs no solver.)
+# `plan_matrix(N)` is the matrix of task 5.7: all states of a plan, from the first state and the inputs.
 
 
 # %%
-def filter_1d(x, wish, person, velocity, gamma):
-    """The velocity nearest to the wish [m/s] that the barrier allows."""
-    ### BEGIN SOLUTION
-    h = person - x - RADIUS
-    limit = gamma * h / DT + velocity
-    return np.clip(min(wish, limit), -V_MAX, V_MAX)
-    ### END SOLUTION
-
-
-# %%
-judges.check("filter_1d", filter_1d)
-
-# %% [markdown]
-# ## 7.2 A filter in the plane (25 min)
-#
-# Now `x` and `wish` have shape (2,), `people` and `velocities` shape (n, 2). The barrier of person $i$ is
-# $h_i = \|\mathbf x - \mathbf p_i\| - R$, and $\mathbf n_i$ is the unit vector from the person to the robot.
-# Since $h_i$ changes by $\mathbf n_i^\top(\mathbf u - \mathbf w_i)\,\Delta t$ in a step at least, the
-# condition is satisfied if
-#
-# $$\mathbf n_i^\top (\mathbf u - \mathbf w_i) \ge -\gamma\,h_i / \Delta t \quad\text{for each person.}$$
-#
-# Give the velocity $\mathbf u$, shape (2,), with the smallest $\|\mathbf u - \text{wish}\|^2$, each of its
-# numbers in [-V_MAX, V_MAX].
-
-
-# %%
-def filter_2d(x, wish, people, velocities, gamma):
-    """The velocity (2,) nearest to the wish [m/s] that the barriers of all people allow."""
-    ### BEGIN SOLUTION
-    distance = np.linalg.norm(x - people, axis=1)
-    away = (x - people) / distance[:, None]
-    h = distance - RADIUS
-    least = (away * velocities).sum(axis=1) - gamma * h / DT
-    return solve_qp(2 * np.eye(2), -2 * wish, away, least, -V_MAX, V_MAX)
-    ### END SOLUTION
-
-
-# %%
-judges.check("filter_2d", filter_2d)
-
-# %% [markdown]
-# ## 7.3 The states of a plan (25 min)
-#
-# From here on the robot has inertia: its input is an acceleration $u$ [m/s2], and
-#
-# $$\mathbf s_{k+1} = A\,\mathbf s_k + B\,u_k,\quad \mathbf s = \begin{pmatrix}x\\v\end{pmatrix},\quad
-#   A = \begin{pmatrix}1&\Delta t\\0&1\end{pmatrix},\quad
-#   B = \begin{pmatrix}\Delta t^2/2\\\Delta t\end{pmatrix}.$$
-#
-# A *condensed* MPC has no states among its unknowns: they are computed from the inputs. Give the matrix $M$,
-# shape (2 N, 2 + N), for which
-#
-# $$(x_1, v_1, x_2, v_2, \dots, x_N, v_N) = M\,(x_0, v_0, u_0, \dots, u_{N-1}).$$
-#
-# The check puts your matrix into an MPC of its own, for several N.
-
-
-# %%
-def predict(N):
-    """The matrix (2 N, 2 + N) that gives all states of a plan."""
-    ### BEGIN SOLUTION
+def plan_matrix(N):
+    """The matrix (2 N, 2 + N) that gives all states of a plan, as in task 5.7."""
     A, B = np.array([[1, DT], [0, 1]]), np.array([DT**2 / 2, DT])
     M, state = [], np.eye(2, 2 + N)
     for k in range(N):
@@ -133,21 +67,17 @@ def predict(N):
         state[:, 2 + k] = B
         M.append(state)
     return np.vstack(M)
-    ### END SOLUTION
 
-
-# %%
-judges.check("predict", predict)
 
 # %% [markdown]
-# ## 7.4 MPC on a road (25 min)
+# ## 6.1 MPC on a road (25 min)
 #
 # `state` is $(x_0, v_0)$, `goal` a position [m]. Give the plan $u_0, \dots, u_{N-1}$, shape (N,), with the
 # smallest cost
 #
 # $$\sum_{k=1}^{N}\left((x_k - goal)^2 + 2\,v_k^2\right) + \sum_{k=0}^{N-1} u_k^2, \qquad |u_k| \le A_{max}.$$
 #
-# Put the states of 7.3 in, and read off H and f. The robot takes the first input of each plan, and asks
+# Put the states of 5.7 in, and read off H and f. The robot takes the first input of each plan, and asks
 # again.
 
 
@@ -155,7 +85,7 @@ judges.check("predict", predict)
 def mpc_1d(state, goal):
     """The plan (N,) [m/s2] with the smallest cost."""
     ### BEGIN SOLUTION
-    M = predict(N)
+    M = plan_matrix(N)
     free, G = M[:, :2] @ state, M[:, 2:]  # states without input, and what the inputs add
     Q = np.diag(np.tile([1, 2], N))
     error = free - np.tile([goal, 0], N)
@@ -169,7 +99,7 @@ def mpc_1d(state, goal):
 judges.check("mpc_1d", mpc_1d)
 
 # %% [markdown]
-# ## 7.5 MPC-CBF on a road (25 min)
+# ## 6.2 MPC-CBF on a road (25 min)
 #
 # The same with a person on the road, who is at `person` and walks with `velocity`, so that they will be at
 # $p_k = \text{person} + k\,\Delta t\,\text{velocity}$. The barrier is $h_k = p_k - x_k - R$. Applied k times,
@@ -177,7 +107,7 @@ judges.check("mpc_1d", mpc_1d)
 #
 # $$h_k \ge (1-\gamma)^k\,h_0, \quad k = 1, \dots, N_h .$$
 #
-# Add these rows to the program of 7.4, and give its plan, shape (N,). (Chapter 08 requires eq. 1 in each step, which
+# Add these rows to the program of 6.1, and give its plan, shape (N,). (Chapter 08 requires eq. 1 in each step, which
 # is a little stricter.)
 
 
@@ -185,7 +115,7 @@ judges.check("mpc_1d", mpc_1d)
 def mpc_cbf_1d(state, goal, person, velocity, gamma, N_h):
     """The plan (N,) [m/s2] with the smallest cost that the barrier allows."""
     ### BEGIN SOLUTION
-    M = predict(N)
+    M = plan_matrix(N)
     free, G = M[:, :2] @ state, M[:, 2:]
     Q = np.diag(np.tile([1, 2], N))
     H = 2 * (G.T @ Q @ G + np.eye(N))
@@ -202,10 +132,10 @@ def mpc_cbf_1d(state, goal, person, velocity, gamma, N_h):
 judges.check("mpc_cbf_1d", mpc_cbf_1d)
 
 # %% [markdown]
-# ## 7.6 MPC-CBF in the plane (45 min)
+# ## 6.3 MPC-CBF in the plane (45 min)
 #
 # `state` is $(x, y, v_x, v_y)$, `goal` and each of `people` and `velocities` have shape (2,). Each axis has
-# the dynamics and the cost of 7.4. A distance is no linear function of the inputs, so the direction of each
+# the dynamics and the cost of 6.1. A distance is no linear function of the inputs, so the direction of each
 # row is taken from `guess`, shape (N, 2): the positions that the last plan gives for $k = 1, \dots, N$. With
 # $\mathbf n_k$ the unit vector from $\mathbf p_k$, where the person will be, to `guess[k - 1]`,
 #
@@ -221,7 +151,7 @@ judges.check("mpc_cbf_1d", mpc_cbf_1d)
 def mpc_cbf_2d(state, goal, people, velocities, gamma, N_h, guess):
     """The plan (N, 2) [m/s2] with the smallest cost that the barriers of all people allow."""
     ### BEGIN SOLUTION
-    M = predict(N)
+    M = plan_matrix(N)
     free, G = M[:, :2] @ state.reshape(2, 2), M[:, 2:]  # a column for each axis
     Q = np.diag(np.tile([1, 2], N))
     H = 2 * (G.T @ Q @ G + np.eye(N))
@@ -243,9 +173,9 @@ def mpc_cbf_2d(state, goal, people, velocities, gamma, N_h, guess):
 judges.check("mpc_cbf_2d", mpc_cbf_2d)
 
 # %% [markdown]
-# ## 7.7 gamma and N_h (30 min)
+# ## 6.4 gamma and N_h (30 min)
 #
-# Robots with other brakes take the controller of 7.5: `a_max` [m/s2] is between 0.25 and 2. Give $\gamma$ and
+# Robots with other brakes take the controller of 6.2: `a_max` [m/s2] is between 0.25 and 2. Give $\gamma$ and
 # $N_h$, from 2 to N, for each. A person stands 20 cm farther than needed behind the goal, or comes towards the robot with
 # up to 0.65 m/s. With a large $\gamma$ the robot finds out too late that it cannot brake, and the program has
 # no solution; with a small one it creeps, and does not arrive in time: 28 s for the weakest brakes, 9.6 s for
@@ -268,7 +198,7 @@ def tuned(a_max):
 judges.check("tuned", tuned)
 
 # %% [markdown]
-# ## 7.8 In your own words (10 min)
+# ## 6.5 In your own words (10 min)
 #
 # Your controller was judged in closed loop, and against the exact minimum of its program. What does each
 # of the two show that the other does not? Which failure on a real robot would neither of them find? Write

@@ -1,4 +1,4 @@
-"""Sheet 4: a quantile, the nearest of many approaches, a p-value, the time-shifted null model."""
+"""Tasks: a quantile, the nearest of many approaches, a p-value, the time-shifted null model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sheet 2: complementary coordinates, nearest approaches, precision and recall, LOF's blind spot."""
+"""Tasks: complementary coordinates, nearest approaches, precision and recall, LOF's blind spot."""
 
 from __future__ import annotations
 

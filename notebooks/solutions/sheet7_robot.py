@@ -12,19 +12,18 @@
 # ---
 
 # %% [markdown]
-# # Sheet 6 - The robot
+# # Sheet 7 - The robot
 #
 # Write each function, then run the cell below it: it asks your function for many fresh cases and says
 # what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
-# `judges.hint("speed_limit", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# `judges.hint("largest_gamma", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
 # pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · next: [sheet
-# 7](sheet7_controller.ipynb) · [to do](../exercises/sheet6_robot.ipynb) ·
-# [solved](../solutions/sheet6_robot.ipynb) · 1 h 50 min · belongs to [07](../07_barriers.ipynb),
-# [09](../09_passing.ipynb), [11](../11_waiting.ipynb), [12](../12_among_people.ipynb),
-# [21](../deeper/21_feasibility.ipynb)
+# [Start](../00_start_here.ipynb) · before: [sheet 6](sheet6_controller.ipynb) · [to
+# do](../exercises/sheet7_robot.ipynb) · [solved](../solutions/sheet7_robot.ipynb) · 1 h 45 min · belongs to
+# [08](../08_build_a_controller.ipynb), [09](../09_passing.ipynb), [11](../11_waiting.ipynb),
+# [12](../12_among_people.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.
@@ -41,26 +40,7 @@ import szlib
 from szlib.workbook import figures
 
 # %% [markdown]
-# ## 6.1 The speed limit (5 min)
-#
-# The robot drives straight at a person who walks straight at the robot with `person_speed` [m/s]. The
-# barrier is at `h` [m] and may fall by the share `gamma` in a step of `dt` [s]. How fast may the
-# robot be [m/s]? (Negative: it has to go back.)
-
-
-# %%
-def speed_limit(h, gamma, dt, person_speed):
-    """Largest speed of the robot towards the person [m/s]."""
-    ### BEGIN SOLUTION
-    return gamma * h / dt - person_speed
-    ### END SOLUTION
-
-
-# %%
-judges.check("speed_limit", speed_limit)
-
-# %% [markdown]
-# ## 6.2 gamma by experiment (40 min)
+# ## 7.1 gamma by experiment (40 min)
 #
 # With the paper's two barrier steps ($N_h = 2$, 0.2 s) a large gamma lets the robot find out too late
 # that it cannot brake any more: the problem has no solution, the step is *infeasible*. For the
@@ -104,7 +84,7 @@ judges.check("largest_gamma", largest_gamma)
 # larger, for the robot also goes around.
 
 # %% [markdown]
-# ## 6.3 The terminal proof (15 min)
+# ## 7.2 The terminal proof (15 min)
 #
 # With `terminal="rest"` each plan ends at rest, $\mathbf{v}_N = 0$, and the barrier rows hold on the
 # whole horizon. Everybody stands. The robot has applied the first control of `plan`, shape (N, 2)
@@ -130,7 +110,7 @@ judges.check("next_plan", next_plan)
 # one solution leads to the next, for ever.
 
 # %% [markdown]
-# ## 6.4 Predict, then run (20 min)
+# ## 7.3 Predict, then run (20 min)
 #
 # Before you run anything: what becomes larger, and what smaller? `prediction` is asked about twelve changes
 # of one parameter, from `before` to `after`, and answers "larger" or "smaller" for a `quantity`:
@@ -163,7 +143,7 @@ def prediction(scenario, change, before, after, quantity):
 judges.check("prediction", prediction)
 
 # %% [markdown]
-# ## 6.5 Count the ways (20 min)
+# ## 7.4 Count the ways (20 min)
 #
 # `paths`, shape (m, T, 2), are m ways of a robot to its goal [m]. `people`, shape (n, T, 2), is where n people are
 # at the same T times; some of them walk. All ways begin and end at the same two places, and at no time is the robot in a
@@ -193,7 +173,7 @@ judges.check("count_ways", count_ways)
 # A plan of one row cannot become a plan of another row by small changes.
 
 # %% [markdown]
-# ## 6.6 In your own words (10 min)
+# ## 7.5 In your own words (10 min)
 #
 # You must choose gamma for a robot in a hospital corridor. Which experiments of this sheet help, which do
 # not, and what would you have to measure in that corridor first? Write five to eight sentences.
@@ -203,7 +183,7 @@ judges.check("count_ways", count_ways)
 #
 # | points | for |
 # |---|---|
-# | 3 | gamma depends on brake, speed and horizon: 6.1 and 6.2 with the numbers of that robot |
+# | 3 | gamma depends on brake, speed and horizon: 4.2 and 7.1 with the numbers of that robot |
 # | 3 | the scenarios have one person who keeps their velocity; the corridor has others |
 # | 2 | measured first: speeds and sudden stops of people, delay of the sensors, the true brake |
 # | 2 | infeasible steps are separated from h < 0, and the answer says what gives way first |

@@ -1,4 +1,4 @@
-"""Sheet 7: a CBF-QP, an MPC and an MPC-CBF, first on a road, then in the plane, judged in closed loop.
+"""Tasks: a CBF-QP, an MPC and an MPC-CBF, first on a road, then in the plane, judged in closed loop.
 
 A world holds a robot, its goal, and people who stand or walk. The judge drives the robot with the learner's
 function until it arrives. It refuses h < 0, inputs beyond their limits, and a robot that does not arrive;

@@ -1,4 +1,4 @@
-"""Sheet 3: a point of a slice, the zone's radius, the smallest ellipse, a zone of your own."""
+"""Tasks: a point of a slice, the zone's radius, the smallest ellipse, a zone of your own."""
 
 from __future__ import annotations
 

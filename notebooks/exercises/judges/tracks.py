@@ -1,4 +1,4 @@
-"""Sheet 1: velocity from positions, the line of sight, the attentional space, sampling at 1 Hz."""
+"""Tasks: velocity from positions, the line of sight, the attentional space, sampling at 1 Hz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sheet 6: the robot's speed limit, gamma by experiment, the terminal proof, predictions, distinct ways."""
+"""Tasks: the robot's speed limit, gamma by experiment, the terminal proof, predictions, distinct ways."""
 
 from __future__ import annotations
 

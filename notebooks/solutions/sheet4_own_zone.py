@@ -1,0 +1,109 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Sheet 4 - A zone of your own
+#
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("my_zone", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · before: [sheet 3](sheet3_zones.ipynb) · next: [sheet
+# 5](sheet5_barriers.ipynb) · [to do](../exercises/sheet4_own_zone.ipynb) ·
+# [solved](../solutions/sheet4_own_zone.ipynb) · 2 h 45 min · belongs to [05](../05_zones.ipynb),
+# [07](../07_barriers.ipynb)
+
+# %%
+# Solution: the judges are in the folder of the sheets.
+import sys
+
+sys.path.append("../exercises")
+
+# %%
+import judges
+import numpy as np
+
+import szlib
+
+# %% [markdown]
+# ## 4.1 A zone of your own (an evening, 150 min)
+#
+# `samples` are the encounters of a fresh plaza: columns `encounter`, `los_angle` [rad], `distance`
+# [m], `speed` of the reference pedestrian [m/s]. Everybody keeps out of everybody's zone, but one in
+# a hundred walks right through it. Find the zone of people who walk at `speed` [m/s], as a `szlib.Ellipse` in the
+# person's frame: centre and semi-axes within 10 cm and, where the semi-axes differ, the angle within 0.2 rad.
+# Width, length, centre, angle, speed, and whether zones grow or shrink with speed are drawn anew each
+# time, each for itself. Of szlib you may use `szlib.Ellipse` only.
+
+
+# %%
+def my_zone(samples, speed):
+    """The zone at this speed [m/s], a szlib.Ellipse in the person's frame."""
+    ### BEGIN SOLUTION
+    close = samples[(samples["distance"] <= 2) & samples["speed"].between(speed - 0.2, speed + 0.2)]
+    edge = []
+    for theta in np.radians(np.arange(-180, 180, 10)):
+        off = np.angle(np.exp(1j * (close["los_angle"] - theta)))
+        approach = close[np.abs(off) < np.radians(12)].groupby("encounter")["distance"].min()
+        edge.append(np.quantile(approach, 0.07) * np.array([np.cos(theta), np.sin(theta)]))
+    x, y = np.transpose(edge)
+    terms = np.column_stack([x * x, x * y, y * y, x, y])
+    p, q, r, s, t = np.linalg.lstsq(terms, np.ones(len(x)))[0]
+    form = np.array([[p, q / 2], [q / 2, r]])
+    center = -np.linalg.solve(form, [s, t]) / 2
+    values, vectors = np.linalg.eigh(form / (1 + center @ form @ center))
+    a, b = 1 / np.sqrt(values)
+    return szlib.Ellipse(center, (a, b), np.arctan2(vectors[1, 0], vectors[0, 0]))
+    ### END SOLUTION
+
+
+# %%
+judges.check("my_zone", my_zone)
+
+# %% [markdown]
+# ## 4.2 The speed limit (5 min)
+#
+# The robot drives straight at a person who walks straight at the robot with `person_speed` [m/s]. The
+# barrier is at `h` [m] and may fall by the share `gamma` in a step of `dt` [s]. How fast may the
+# robot be [m/s]? (Negative: it has to go back.)
+
+
+# %%
+def speed_limit(h, gamma, dt, person_speed):
+    """Largest speed of the robot towards the person [m/s]."""
+    ### BEGIN SOLUTION
+    return gamma * h / dt - person_speed
+    ### END SOLUTION
+
+
+# %%
+judges.check("speed_limit", speed_limit)
+
+# %% [markdown]
+# ## 4.3 In your own words (10 min)
+#
+# Your zone of 4.1 is within 10 cm on synthetic plazas. Name three reasons why it may be farther off in a
+# real hall, and for each of them what you would look at in the data to notice it. Write five to eight
+# sentences.
+
+# %% [markdown]
+# **Rubric** (10 points; a person grades this answer)
+#
+# | points | for |
+# |---|---|
+# | 3 | three different reasons, such as few encounters in a direction, groups, walls, errors of tracking, culture or crowding |
+# | 3 | for each reason an observation in the data that would show it |
+# | 2 | bias is told from noise: which of the reasons more data would not mend |
+# | 2 | the choice of quantile and speed range of one's own method is discussed |
