@@ -42,7 +42,7 @@ def test_only_files_py_writes_files() -> None:
             made = name in INTO_A_BUFFER and first not in ("", "content", "buffer")
             if name in WRITERS or opens or made:
                 found.append(f"{path.relative_to(PACKAGE)}: {ast.unparse(node)[:60]}")
-    unpacked = [each for each in found if each.endswith("unpacked.open('wb')")]
+    unpacked = [each for each in found if each.endswith("target.open('wb')")]
     appended = [each for each in found if "Path(file).open('a'" in each]
     assert [each for each in found if each not in unpacked + appended] == [
         "core/files.py: unfinished.open('xb')"
