@@ -28,8 +28,7 @@ from .values import require_distinct_ids, scale_times, to_ids, to_numbers, to_ti
 
 EXPECTED = (
     "expected a table (text, Parquet, Feather, SQLite, JSON lines) with columns t or frame, id, x, y; or one "
-    f"of {', '.join(name for name in SHAPES if name != 'tidy')}; plain, .gz or .zip; Grand Central and "
-    "Edinburgh are read by szlib.tracks.sites"
+    f"of {', '.join(name for name in SHAPES if name != 'tidy')}; plain, .gz or .zip"
 )
 """What can be read, for error messages."""
 MISSING, MISPLACED = (

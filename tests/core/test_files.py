@@ -20,7 +20,6 @@ import szlib
 from szlib.core import files, input_files, memory
 from szlib.core.errors import MemoryLimitError, StorageError
 from szlib.simulation.log import SimulationLog
-from szlib.tracks.interop import read_groups
 from szlib.workbook.report import write_report
 
 PACKAGE = Path(szlib.__file__).parent
@@ -234,7 +233,7 @@ NO_SMALL_FILES: dict[str, Callable[[Path], object]] = {
     [
         ("area.json", szlib.as_area),
         ("zone.json", szlib.SocialZone.load),
-        ("groups.txt", read_groups),
+        ("reading.json", szlib.Recipe.load),
         ("run.json", SimulationLog.load),
         ("summary.json", lambda path: write_report(path.parent)),
     ],

@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import real_data
+from studies import quality
 
 import szlib
 from szlib.encounters.one_day import find_encounters_in_files
-from szlib.tracks import funnels, quality
+from szlib.tracks import funnels
 
 CONVENTIONS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}
 
