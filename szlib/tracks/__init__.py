@@ -6,7 +6,6 @@ shapes        the shapes of files that have a name, each with its recipe
 sources       files and tables as columns: text, Parquet, Feather, SQLite, JSON, those of libraries
 columns       which column holds what
 rows          from columns to rows in seconds and metres
-ewap          the frame rate of EWAP files, estimated from their velocities
 plausibility  whether people can move as they do in a table; if not, what was misread
 recordings    which files are pieces of one recording
 readers       rows of files as they are: `read_raw`
