@@ -55,11 +55,12 @@ import pandas as pd
 import plots
 from IPython.display import Markdown
 from studies import hours as hours_study
+from studies import quality
 
 import szlib
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.tracks import funnels, quality
+from szlib.tracks import funnels
 from szlib.tracks.readers import CALENDAR_BEGINS, find_format
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters, read_table

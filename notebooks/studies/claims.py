@@ -27,12 +27,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 from scipy.stats import t as student_t
 from studies import paper_claims as claims
+from studies import sites
 from studies.committed import study, write_table
 from studies.plaza_truth import true_kinds
 from studies.respect import stored
 
 import szlib
-from szlib.tracks import sites
 from szlib.workbook import figures
 from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import FIT, sensitivity
@@ -68,7 +68,7 @@ SITES: dict[str, tuple[Callable[[], pd.DataFrame], szlib.Square]] = {
         szlib.Square(x=(10.0, 40.0), y=(10.0, 50.0)),
     ),
     "THOR-MAGNI": (
-        lambda: sites.read_magni(DATA / "magni" / "A.csv"),
+        lambda: szlib.read_tracks(DATA / "magni" / "A.csv"),
         szlib.Square(x=(-9.3, 9.3), y=(-4.0, 3.8)),
     ),
     "ETH": (

@@ -11,10 +11,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
+from studies import quality
 from studies.committed import study, write_table
 
 import szlib
-from szlib.tracks import quality
 
 SMALL = szlib.PlazaSettings(n_encounters=150)
 

@@ -27,11 +27,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from studies.committed import study, write_table
 from studies.noninteracting_crowd import noninteracting_crowd
+from studies.sites import GRAND_CENTRAL_RATE, read_grand_central
 
 import szlib
 from szlib.core.parallel import run_tasks
 from szlib.tracks.clock import to_clock
-from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
 from szlib.workbook import figures
 
 Encounters = tuple[pd.DataFrame, szlib.NullEncounters]

@@ -124,17 +124,14 @@ def _require_clear(
 
 
 def _require_known(where: str, recipe: Recipe) -> None:
-    """Raise DataError where frames have no rate, times have one, or pixels no scale.
-
-    The rate of EWAP files follows from their velocities.
-    """
+    """Raise DataError where frames have no rate, times have one, or pixels no scale."""
     columns, guesses, missing = dict(recipe.columns or {}), dict[str, object](), []
     if "t" in columns and recipe.frame_rate is not None:
         raise DataError(
             f"{where}: its times are in seconds; leave frame_rate out, or name the column that counts "
             f"frames: {advise(columns={'frame': columns['t']})}"
         )
-    if "frame" in columns and recipe.frame_rate is None and "vx" not in columns:
+    if "frame" in columns and recipe.frame_rate is None:
         missing.append(
             f"{columns['frame']!r} counts frames; pass frame_rate=, frames a second of the video"
         )

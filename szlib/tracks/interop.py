@@ -1,4 +1,4 @@
-"""What a track table must be, groups of people who walk together, and the conversion to PedPy.
+"""What a track table must be, and the conversion to PedPy.
 
 A loader for a new data set is a function that returns a **track table**; everything after it
 (`find_encounters`, `SocialZone.fit`, every plot) needs only
@@ -18,16 +18,13 @@ The short way: collect day, id, t [s], x, y [m] in any order and at any rate, co
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from scipy.cluster.hierarchy import DisjointSet
 
 from ..core.checks import check_rows
-from ..core.errors import DataError, warn
-from ..core.input_files import read_small, reading
+from ..core.errors import DataError
 from . import funnels
 from .clock import (
     COLUMNS,
@@ -92,62 +89,6 @@ def check_tracks(tracks: pd.DataFrame) -> None:
         funnels.stage(
             stage["stage"], stage["entered"], stage["kept"], stage["rejected"]
         )
-
-
-def read_groups(path: str | Path) -> pd.DataFrame:
-    """Read which people walk together, from an EWAP file ``groups.txt``.
-
-    Parameters
-    ----------
-    path : a file of the ids of one group a line, separated by blanks.
-
-    Returns
-    -------
-    Columns group (numbered from 0) and id, in the order of the file.  People in no line walk alone.
-    Lines that share a person make one group, with a DataWarning: the ETH sequence has such lines.
-
-    Raises
-    ------
-    DataError : a line holds something else than ids, or a single id.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from szlib.tracks import read_groups
-    >>> _ = Path("groups.txt").write_text("1 2\\n5 3 4\\n")
-    >>> read_groups("groups.txt").groupby("group")["id"].apply(list).tolist()
-    [[1, 2], [5, 3, 4]]
-    """
-    path = Path(path)
-    with reading(path, "as groups", "ids, a group a line"):
-        lines = read_small(path).decode("utf-8").splitlines()
-    groups: DisjointSet = DisjointSet()
-    joined = []
-    for number, line in enumerate(lines, start=1):
-        fields = line.split()
-        if not fields:
-            continue
-        if not all(field.isdecimal() for field in fields) or len(set(fields)) < 2:
-            raise DataError(
-                f"{path}, line {number}: {line[:80]!r} is no group; expected two or more ids"
-            )
-        people = list(map(int, fields))
-        if any(person in groups for person in people):
-            joined.append(number)
-        for person in people:
-            groups.add(person)
-            groups.merge(people[0], person)
-    if joined:
-        where = ", ".join(map(str, joined))
-        warn(f"{path.name}: joined to earlier groups that share people: line {where}")
-    ids = list(groups)
-    table = pd.DataFrame(
-        {
-            "group": pd.factorize(np.array([groups[person] for person in ids]))[0],
-            "id": ids,
-        }
-    )
-    return table.astype("int64").sort_values("group", kind="stable", ignore_index=True)
 
 
 def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:

@@ -21,7 +21,7 @@ from ..core.input_files import read_small, reading
 
 # Which column holds each quantity: its name, the number of the field from 0, or a sum of columns in SQL.
 Columns = Mapping[str, str | int]
-QUANTITIES = ("t", "frame", "id", "x", "y", "day", "speed", "vx", "vy")
+QUANTITIES = ("t", "frame", "id", "x", "y", "day", "speed")
 UNITS = {
     "m": 1.0,
     "cm": 1e-2,

@@ -13,7 +13,6 @@ import polars as pl
 
 from ..core.errors import DataError
 from .columns import ask_about_recordings, column_of, find_columns
-from .ewap import measure_frames
 from .recipe import DEGREES, Recipe, advise
 from .shapes import ATC_YEAR, SHAPES, Shape, recognise
 from .sources import (
@@ -28,8 +27,7 @@ from .values import require_distinct_ids, scale_times, to_ids, to_numbers, to_ti
 
 EXPECTED = (
     "expected a table (text, Parquet, Feather, SQLite, JSON lines) with columns t or frame, id, x, y; or one "
-    f"of {', '.join(name for name in SHAPES if name != 'tidy')}; plain, .gz or .zip; Grand Central and "
-    "Edinburgh are read by szlib.tracks.sites"
+    f"of {', '.join(name for name in SHAPES if name != 'tidy')}; plain, .gz or .zip"
 )
 """What can be read, for error messages."""
 MISSING, MISPLACED = (
@@ -185,21 +183,11 @@ def load_rows(
         day = text.set(text == "", None)
     elif not is_head and recipe.file_format == "tidy":
         ask_about_recordings(source, recipe, t, ids, by_name=not is_told)
-    more = {
-        k: to_numbers(values[k], source.decimal)
-        for k in ("vx", "vy", "speed")
-        if k in values
-    }
+    if "speed" in values:
+        numbers["speed"] = to_numbers(values["speed"], source.decimal)
     table = _with_exact_ids(
-        table.with_columns(t, ids.alias("id"), **numbers, **more).lazy()
+        table.with_columns(t, ids.alias("id"), **numbers).lazy()
     ).collect()
-    if recipe.file_format == "ewap":
-        rate, gap = measure_frames(
-            table.with_columns(id="exact_id"), path, recipe.frame_rate
-        )
-        gap = recipe.max_gap or gap
-        recipe = replace(recipe, frame_rate=rate, max_gap=gap)
-        table = table.with_columns(pl.col("t") * (1 / rate))
     table = to_metres(table, recipe, path)
     if day is not None:
         table = table.with_columns(day=day)
@@ -212,14 +200,11 @@ def load_rows(
 def _read_times(
     values: dict[str, pl.Series], recipe: Recipe, source: Source, path: Path
 ) -> tuple[pl.Series, pl.Series | None]:
-    """The times [s], or frames of EWAP; and the local date of each, where the file states its zone."""
+    """The times [s]; and the local date of each, where the file states its zone."""
     tz, decimal = recipe.tz or "UTC", source.decimal
     if "frame" in values:
         frames = to_numbers(values["frame"], decimal)
-        seconds = (
-            1 / recipe.frame_rate if recipe.frame_rate and "vx" not in values else 1.0
-        )
-        return (frames if seconds == 1 else frames * seconds).alias("t"), None
+        return (frames * (1 / (recipe.frame_rate or 1.0))).alias("t"), None
     if recipe.time_unit and 2 * to_numbers(values["t"], decimal).null_count() <= len(
         values["t"]
     ):

@@ -19,7 +19,7 @@ import pandas as pd
 import polars as pl
 
 from ..core.checks import check_columns, require
-from ..core.errors import DataError, SzlibError
+from ..core.errors import DataError, SzlibError, warn
 from ..core.input_files import reading
 from .recipe import Recipe
 from .sources import (
@@ -31,6 +31,7 @@ from .sources import (
     read_text,
     split_line,
 )
+from .values import to_numbers
 
 # Central square of the ATC mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues).
 ATC_AREA = ((-18.5, -7.5), (-10.0, 8.0))
@@ -45,8 +46,14 @@ _ATC_TIMES = (1_350_000_000.0, 1_390_000_000.0)
 _SESSION = 0.5
 _MAGNI = ("Time", "ag_id", "x", "y", "data_label")
 
+# Frames a second of EWAP files: ETH; hotel, zara and students.  A track ends after so many sampling intervals
+# without a sample: 0.9 s where samples are 0.4 s apart.
+_EWAP_RATES, _EWAP_GAP = (15.0, 25.0), 2.25
+# A rate needs so many steps of at least this length [m], and is at most this share off.
+_EWAP_STEPS, _EWAP_STEP, _EWAP_ERROR = 10, 0.02, 0.1
+
 # The table of an unpacked file, given as a path and read with a recipe; and this recipe, completed.
-Parsed = tuple[pl.DataFrame | pd.DataFrame, Recipe]
+Parsed = tuple[pl.DataFrame | pd.DataFrame | Source, Recipe]
 
 
 @dataclass(frozen=True)
@@ -120,7 +127,9 @@ class Shape:
             table, recipe = self.parse(plain, path, recipe)
             if isinstance(table, pd.DataFrame):
                 table = pl.from_pandas(table.reset_index(drop=True), nan_to_null=False)
-            return open_frame(table, f"{path}"), recipe
+            if isinstance(table, pl.DataFrame):
+                table = open_frame(table, f"{path}")
+            return table, recipe
         except SzlibError:
             raise
         except Exception as error:  # of any library that a reader uses
@@ -145,6 +154,40 @@ def _parse_splines(plain: Path, path: Path, recipe: Recipe) -> Parsed:
             x, y, frame, *_rest = next(lines).split()
             rows.append((float(frame), person, float(x), float(y)))
     return pd.DataFrame(rows, columns=["frame", "id", "x", "y"]), recipe
+
+
+def _parse_ewap(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+    """EWAP counts frames: their rate follows from the displacement in a frame, and the velocity."""
+    source, given = open_text(plain, f"{path}", has_header=False), recipe.frame_rate
+    columns = {"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
+    rows = pl.DataFrame(
+        {name: to_numbers(source.column(k)) for name, k in columns.items()}
+    )
+    rows = rows.filter(pl.all_horizontal(pl.all().is_finite())).sort("id", "frame")
+    steps = rows.select(
+        pl.col("frame", "x", "y").diff().over("id"),
+        pl.col("vx", "vy").rolling_mean(2).over("id"),
+    ).filter(pl.col("frame") > 0)
+    x, y = pl.col("x"), pl.col("y")
+    length = x**2 + y**2
+    rates = steps.filter(length > _EWAP_STEP**2).select(
+        (x * pl.col("vx") + y * pl.col("vy")) * pl.col("frame") / length
+    )
+    median = rates.median().item() if rates.height >= _EWAP_STEPS else 0.0
+    near = [r for r in _EWAP_RATES if abs(median - r) < _EWAP_ERROR * r]
+    if given is None and not near:
+        raise DataError(
+            f"{path}: the frame rate cannot be estimated from the file's velocities; pass frame_rate=15 "
+            "(ETH) or 25 (hotel, zara, students), or what the video has"
+        )
+    rate = given or near[0]
+    if near and abs(rate - near[0]) > _EWAP_ERROR * near[0]:
+        warn(
+            f"{path.name}: read at {rate:g} frames/s as given; its velocities suggest {near[0]:g}"
+        )
+    interval = steps["frame"].median()
+    gap = _EWAP_GAP * interval / rate if isinstance(interval, float) else None
+    return source, recipe.over(Recipe(frame_rate=rate, max_gap=gap))
 
 
 def _parse_trajnet(plain: Path, path: Path, recipe: Recipe) -> Parsed:
@@ -390,8 +433,8 @@ _SHAPES = (
               "t": 0, "id": 1, "x": 2, "y": 3, "speed": 5}), n_fields=8, is_streamed=True),
     Shape("atc-1hz", Recipe(time_unit="s", max_gap=1.6, tz="Asia/Tokyo", area=_ATC_TEXT, columns={
               "t": 0, "id": 1, "x": 2, "y": 3, "speed": 4}), n_fields=6),
-    Shape("ewap", Recipe(columns={"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}),
-          n_fields=8, separator=" ", is_sequence=True),
+    Shape("ewap", Recipe(columns={"frame": 0, "id": 1, "x": 2, "y": 4}), n_fields=8, separator=" ",
+          parse=_parse_ewap, is_sequence=True),
     Shape("tidy"),
 )  # fmt: skip
 SHAPES: dict[str, Shape] = {each.name: each for each in _SHAPES}

@@ -20,7 +20,6 @@ import szlib
 from szlib.core import files, input_files, memory
 from szlib.core.errors import MemoryLimitError, StorageError
 from szlib.simulation.log import SimulationLog
-from szlib.tracks.interop import read_groups
 from szlib.workbook.report import write_report
 
 PACKAGE = Path(szlib.__file__).parent
@@ -42,7 +41,7 @@ def test_only_files_py_writes_files() -> None:
             made = name in INTO_A_BUFFER and first not in ("", "content", "buffer")
             if name in WRITERS or opens or made:
                 found.append(f"{path.relative_to(PACKAGE)}: {ast.unparse(node)[:60]}")
-    unpacked = [each for each in found if each.endswith("unpacked.open('wb')")]
+    unpacked = [each for each in found if each.endswith("target.open('wb')")]
     appended = [each for each in found if "Path(file).open('a'" in each]
     assert [each for each in found if each not in unpacked + appended] == [
         "core/files.py: unfinished.open('xb')"
@@ -234,7 +233,7 @@ NO_SMALL_FILES: dict[str, Callable[[Path], object]] = {
     [
         ("area.json", szlib.as_area),
         ("zone.json", szlib.SocialZone.load),
-        ("groups.txt", read_groups),
+        ("reading.json", szlib.Recipe.load),
         ("run.json", SimulationLog.load),
         ("summary.json", lambda path: write_report(path.parent)),
     ],

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import DAY, make_crowd, make_tracks, make_walk, real_data
+from studies import sites
 
 import szlib
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.kinds import COMPANIONS, KINDS, REACH, encounter_kinds, of_kind
-from szlib.tracks import funnels, sites
-from szlib.tracks.interop import read_groups
+from szlib.tracks import funnels
 
 ROOM = szlib.Square(x=(-20, 20), y=(-20, 20))
 
@@ -242,7 +242,7 @@ def confusion(tracks: pd.DataFrame, groups: pd.DataFrame) -> tuple[int, int, int
 def test_groups_of_the_eth_sequence_are_found() -> None:
     folder = real_data("eth")
     with pytest.warns(szlib.DataWarning, match="share people"):
-        groups = read_groups(folder / "seq_eth_groups.txt")
+        groups = sites.read_groups(folder / "seq_eth_groups.txt")
     pairs, true, found, right = confusion(
         szlib.read_tracks(folder / "seq_eth_obsmat.txt"), groups
     )
@@ -258,7 +258,7 @@ def test_groups_of_the_eth_sequence_are_found() -> None:
 def test_groups_of_thor_magni_are_found() -> None:
     file = real_data("magni") / "A.csv"
     pairs, true, found, right = confusion(
-        sites.read_magni(file), sites.read_magni_groups(file)
+        szlib.read_tracks(file), sites.read_magni_groups(file)
     )
     assert (pairs, true) == (198, 24)
     assert (found, right) == (23, 23), "the one missed is of three who walk in a line"

@@ -35,7 +35,7 @@ RESPECT = (
     "radius=round(float(radius.flat[best]), 2)",
     "radius=0.9 * float(radius.flat[best])",
 )
-STANDING = "tracks/quality.py", "\nSTANDING = 0.1\n", "\nSTANDING = 0.2\n"
+STANDING = "../notebooks/studies/quality.py", "\nSTANDING = 0.1\n", "\nSTANDING = 0.2\n"
 DEFAULT = {"03": HULL, "24": STANDING, "06": RESPECT, "25": PATHS}
 """The regression for the tables of a notebook; that of the others is `BARRIER`."""
 OWN = dict.fromkeys(("25_estimators", "25_sensitivity", "25_subsets"), HULL)

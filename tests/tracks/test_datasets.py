@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
+from studies import quality
 
 import szlib
 from szlib.core.errors import DataError
-from szlib.tracks import datasets, quality
+from szlib.tracks import datasets
 
 
 class QuietHandler(SimpleHTTPRequestHandler):

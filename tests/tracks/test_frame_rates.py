@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import real_data
+from studies import quality
 
 import szlib
 from szlib.encounters.one_day import find_encounters_in_files
-from szlib.tracks import funnels, quality
+from szlib.tracks import funnels
 
 CONVENTIONS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}
 
@@ -72,18 +73,14 @@ def test_the_frame_rate_is_estimated_from_velocities(
     assert tracks["t"].max() == pytest.approx(10 * 64 / rate, abs=0.1)
 
 
-def test_an_unusual_frame_rate_warns(tmp_path: Path) -> None:
-    with pytest.warns(
-        szlib.DataWarning,
-        match="its velocities suggest 30 frames/s, EWAP files have 15 or 25",
-    ):
-        tracks = szlib.read_tracks(ewap(tmp_path, rate=30))
+@pytest.mark.parametrize("rate", [12.5, 30])
+def test_an_unusual_frame_rate_has_to_be_given(tmp_path: Path, rate: float) -> None:
+    file = ewap(tmp_path, rate=rate)
+    with pytest.raises(szlib.DataError, match="; pass frame_rate=15"):
+        szlib.read_tracks(file)
+    tracks = szlib.read_tracks(file, frame_rate=rate)
     assert median_speed(tracks) == pytest.approx(1.2, rel=0.05)
-    with pytest.warns(szlib.DataWarning, match=r"12\.5 frames/s"):
-        assert (
-            read_stage_name(szlib.read_tracks(ewap(tmp_path, rate=12.5)))
-            == "read sequence.txt at 12.5 frames/s"
-        )
+    assert read_stage_name(tracks) == f"read sequence.txt at {rate:g} frames/s"
 
 
 def test_a_given_frame_rate_is_used_and_warns_if_velocities_disagree(
@@ -137,7 +134,7 @@ def test_useless_velocities_require_a_given_frame_rate(
 def test_too_few_steps_give_no_frame_rate(tmp_path: Path) -> None:
     file = ewap(tmp_path, rate=25)
     file.write_text("".join(file.read_text().splitlines(keepends=True)[:8]))
-    with pytest.raises(szlib.DataError, match="fewer than 10 steps with a velocity"):
+    with pytest.raises(szlib.DataError, match="cannot be estimated from the file"):
         szlib.read_tracks(file)
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_files import WRITERS, samples
-from helpers.track_tables import make_crowd, make_tracks, make_walk, real_data
+from helpers.track_tables import make_crowd, make_tracks, make_walk
 
 import szlib
 from szlib.tracks import funnels
 from szlib.tracks.clock import COLUMNS, to_clock
-from szlib.tracks.interop import check_tracks, read_groups, to_pedpy
+from szlib.tracks.interop import check_tracks, to_pedpy
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -65,57 +65,6 @@ def test_check_tracks_requires_a_funnel_that_adds_up() -> None:
     ]
     with pytest.raises(szlib.SzlibError, match="does not add up"):
         check_tracks(tracks)
-
-
-def test_groups_of_the_eth_sequence_are_read() -> None:
-    folder = real_data("eth")
-    with pytest.warns(
-        szlib.DataWarning, match="line 37, 38"
-    ):  # 238 is in lines 36 and 37, 241 in 37 and 38
-        groups = read_groups(folder / "seq_eth_groups.txt")
-    assert (
-        groups.loc[groups["id"] == 241, "group"].item()
-        == groups.loc[groups["id"] == 240, "group"].item()
-    )
-    people = set(szlib.read_tracks(folder / "seq_eth_obsmat.txt")["id"])
-    assert groups.groupby("group").size().min() == 2
-    assert groups["id"].is_unique
-    assert set(groups["id"]) <= people
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("1 2\n3 x\n", "line 2: '3 x' is no group"),
-        ("1 2\n\n3\n", "line 3: '3' is no group"),
-        ("1 2\n3 3\n", "line 2: '3 3' is no group"),
-        ("1 2\n3 4.5\n", "line 2"),
-    ],
-)
-def test_invalid_groups_are_refused_with_their_line(
-    tmp_path: Path, text: str, message: str
-) -> None:
-    (tmp_path / "groups.txt").write_text(text)
-    with pytest.raises(szlib.DataError, match=message):
-        read_groups(tmp_path / "groups.txt")
-    with pytest.raises(szlib.DataError, match="cannot be read as groups"):
-        read_groups(tmp_path)
-
-
-def test_blank_lines_in_a_group_file_are_ignored(tmp_path: Path) -> None:
-    (tmp_path / "groups.txt").write_text(" 5 4\n\n 6 3 2 \n")
-    groups = read_groups(tmp_path / "groups.txt")
-    assert groups.to_numpy().tolist() == [[0, 5], [0, 4], [1, 6], [1, 3], [1, 2]]
-
-
-def test_group_lines_that_share_people_are_joined(tmp_path: Path) -> None:
-    (tmp_path / "groups.txt").write_text("1 2\n3 4\n5 6\n4 2 7\n")
-    with pytest.warns(szlib.DataWarning, match="line 4"):
-        groups = read_groups(tmp_path / "groups.txt")
-    assert groups.groupby("group")["id"].apply(set).tolist() == [
-        {1, 2, 3, 4, 7},
-        {5, 6},
-    ]
 
 
 def test_tracks_are_the_same_after_conversion_to_pedpy_and_back() -> None:

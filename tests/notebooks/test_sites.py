@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import real_data
+from studies import sites
 
 import szlib
-from szlib.tracks import funnels, sites
+from szlib.tracks import funnels
 from szlib.tracks.interop import check_tracks
 
 # --- Grand Central -----------------------------------------------------------------------------------
@@ -234,7 +235,7 @@ SESSIONS = [
 
 def test_a_helmet_is_another_person_in_each_session(tmp_path: Path) -> None:
     file = write_magni(tmp_path / "A.csv", SESSIONS)
-    tracks = sites.read_magni(file)
+    tracks = szlib.read_tracks(file)
     check_tracks(tracks)
     assert tracks["id"].unique().tolist() == [
         101,
@@ -276,18 +277,72 @@ def test_damaged_magni_files_are_refused(tmp_path: Path) -> None:
     rows = pd.read_csv(file)
     rows.drop(columns="data_label").to_csv(file, index=False)
     with pytest.raises(szlib.DataError, match="data_label"):
-        sites.read_magni(file)
+        szlib.read_tracks(file, file_format="magni")
     rows.assign(ag_id="Helmet").to_csv(file, index=False)
     with pytest.raises(szlib.DataError, match="ag_id 'Helmet' ends in no number"):
-        sites.read_magni(file)
+        szlib.read_tracks(file)
     with pytest.raises(szlib.DataError, match="no such file"):
-        sites.read_magni(tmp_path / "missing.csv")
+        szlib.read_tracks(tmp_path / "missing.csv")
     bad = rows.index % 100 == 3
     rows.assign(x=np.where(bad, np.nan, rows["x"])).to_csv(file, index=False)
     with pytest.warns(szlib.DataWarning, match=f"{bad.sum()} x not finite"):
-        assert funnels.get(sites.read_magni(file))[0]["rejected"] == {
+        assert funnels.get(szlib.read_tracks(file))[0]["rejected"] == {
             "not finite": bad.sum()
         }
+
+
+# --- groups ------------------------------------------------------------------------------------------
+
+
+def test_groups_of_the_eth_sequence_are_read() -> None:
+    folder = real_data("eth")
+    with pytest.warns(
+        szlib.DataWarning, match="line 37, 38"
+    ):  # 238 is in lines 36 and 37, 241 in 37 and 38
+        groups = sites.read_groups(folder / "seq_eth_groups.txt")
+    assert (
+        groups.loc[groups["id"] == 241, "group"].item()
+        == groups.loc[groups["id"] == 240, "group"].item()
+    )
+    people = set(szlib.read_tracks(folder / "seq_eth_obsmat.txt")["id"])
+    assert groups.groupby("group").size().min() == 2
+    assert groups["id"].is_unique
+    assert set(groups["id"]) <= people
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1 2\n3 x\n", "line 2: '3 x' is no group"),
+        ("1 2\n\n3\n", "line 3: '3' is no group"),
+        ("1 2\n3 3\n", "line 2: '3 3' is no group"),
+        ("1 2\n3 4.5\n", "line 2"),
+    ],
+)
+def test_invalid_groups_are_refused_with_their_line(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    (tmp_path / "groups.txt").write_text(text)
+    with pytest.raises(szlib.DataError, match=message):
+        sites.read_groups(tmp_path / "groups.txt")
+    with pytest.raises(szlib.DataError, match="cannot be read as groups"):
+        sites.read_groups(tmp_path)
+
+
+def test_blank_lines_in_a_group_file_are_ignored(tmp_path: Path) -> None:
+    (tmp_path / "groups.txt").write_text(" 5 4\n\n 6 3 2 \n")
+    groups = sites.read_groups(tmp_path / "groups.txt")
+    assert groups.to_numpy().tolist() == [[0, 5], [0, 4], [1, 6], [1, 3], [1, 2]]
+
+
+def test_group_lines_that_share_people_are_joined(tmp_path: Path) -> None:
+    (tmp_path / "groups.txt").write_text("1 2\n3 4\n5 6\n4 2 7\n")
+    with pytest.warns(szlib.DataWarning, match="line 4"):
+        groups = sites.read_groups(tmp_path / "groups.txt")
+    assert groups.groupby("group")["id"].apply(set).tolist() == [
+        {1, 2, 3, 4, 7},
+        {5, 6},
+    ]
 
 
 # --- the real files ----------------------------------------------------------------------------------
@@ -306,7 +361,7 @@ def test_the_real_grand_central_is_read() -> None:
 
 def test_the_real_magni_is_read() -> None:
     file = real_data("magni") / "A.csv"
-    tracks, groups = sites.read_magni(file), sites.read_magni_groups(file)
+    tracks, groups = szlib.read_tracks(file), sites.read_magni_groups(file)
     check_tracks(tracks)
     assert tracks["id"].nunique() == 60
     assert groups.groupby("group").size().value_counts().to_dict() == {2: 12, 3: 4}

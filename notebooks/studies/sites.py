@@ -1,8 +1,7 @@
-"""Other sites than the ATC mall: Grand Central, Edinburgh's Informatics Forum, THOR-MAGNI.
+"""Other sites than the ATC mall: Grand Central, Edinburgh's Informatics Forum; and groups of people.
 
-Each reader returns a track table as described in `szlib.tracks.interop`.  EWAP files (ETH, hotel, zara,
-students) are read by `szlib.read_tracks`.  szlib ships none of these data: they have no licence, or one of
-their own.
+Each reader returns a track table, as does `szlib.read_tracks`, which reads EWAP (ETH, hotel, zara, students) and
+THOR-MAGNI itself.  These data are not shipped: they have no licence, or one of their own.
 
     site            sampled every   max_gap   what else to know
     Grand Central   0.8 s           0.9 s     marked by hand, 7-16 cm off; its scale is uncertain
@@ -25,14 +24,15 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.cluster.hierarchy import DisjointSet
 
-from ..core.errors import DataError
-from ..core.input_files import read_small, reading
-from . import funnels
-from .clock import read_tracks, to_clock
-from .recipe import Recipe
-from .recordings import check_names
-from .shapes import read_magni_rows
+from szlib.core.errors import DataError, warn
+from szlib.core.input_files import read_small, reading
+from szlib.tracks import funnels
+from szlib.tracks.clock import to_clock
+from szlib.tracks.recipe import Recipe
+from szlib.tracks.recordings import check_names
+from szlib.tracks.shapes import read_magni_rows
 
 # frames a second of the video of Grand Central; every 20th is annotated
 GRAND_CENTRAL_RATE = 25.0
@@ -65,7 +65,7 @@ def read_grand_central(
 
     Examples
     --------
-    >>> from szlib.tracks import read_grand_central
+    >>> from studies.sites import read_grand_central
     >>> tracks = read_grand_central("gc/Annotation.zip")  # doctest: +SKIP
     """
     path = Path(path)
@@ -121,7 +121,7 @@ def read_edinburgh(
     Examples
     --------
     >>> from pathlib import Path
-    >>> from szlib.tracks import read_edinburgh
+    >>> from studies.sites import read_edinburgh
     >>> _ = Path("tracks.Aug24.txt").write_text("TRACK.R1=[[601 23 9];[595 24 10];[589 25 11]];")
     >>> read_edinburgh("tracks.Aug24.txt")[["day", "id", "t"]]
                 day  id    t
@@ -129,51 +129,69 @@ def read_edinburgh(
     1  tracks.Aug24   1  1.1
     2  tracks.Aug24   1  1.2
     """
-    files = (
-        [Path(paths)]
-        if isinstance(paths, str | Path)
-        else [Path(path) for path in paths]
-    )
+    files = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
     if not files:
         raise DataError("no file of Edinburgh was given; pass at least one path")
     Recipe(frame_rate=frame_rate)  # checks the rate
     check_names([file.stem for file in files])
-    parts, n_repeated = zip(
-        *(_read_edinburgh_file(file, frame_rate) for file in files), strict=True
-    )
+    parts, n_repeated = zip(*(_read_edinburgh_file(file, frame_rate) for file in files), strict=True)
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
     reasons = {"a blob of an earlier track": sum(n_repeated)}
     return _finish(pd.concat(parts, ignore_index=True), name, max_gap, reasons)
 
 
-def read_magni(path: str | Path, *, max_gap: float = 0.9) -> pd.DataFrame:
-    """Read THOR-MAGNI (Schreiter et al., 2024).
+def read_groups(path: str | Path) -> pd.DataFrame:
+    """Read which people walk together, from an EWAP file ``groups.txt``.
 
     Parameters
     ----------
-    path : CSV with Time [s], ag_id, x, y [m], data_label.
-    max_gap : a longer gap ends a track [s]; people are sampled every 0.4 s.
+    path : a file of the ids of one group a line, separated by blanks.
 
     Returns
     -------
-    A track table of one recording, which has the name of the file.  Different people wear the same helmet
-    (ag_id) one after the other: a person is one helmet in one session of about four minutes;
-    id = 100 * session + helmet, both from 1.  A session begins where two samples are not 0.4 s apart.
+    Columns group (numbered from 0) and id, in the order of the file.  People in no line walk alone.
+    Lines that share a person make one group, with a DataWarning: the ETH sequence has such lines.
 
     Raises
     ------
-    DataError : the file cannot be read, a column is missing or a helmet has no number.
+    DataError : a line holds something else than ids, or a single id.
 
     Examples
     --------
-    >>> import numpy as np, pandas as pd
-    >>> from szlib.tracks import read_magni
-    >>> rows = pd.DataFrame({"Time": 0.4 * np.arange(4), "ag_id": "Helmet_4", "x": 0.0, "y": 0.0})
-    >>> rows.assign(data_label="Visitors-Alone").to_csv("A.csv", index=False)
-    >>> read_magni("A.csv")["id"].unique()
-    array([104])
+    >>> from pathlib import Path
+    >>> from studies.sites import read_groups
+    >>> _ = Path("groups.txt").write_text("1 2\\n5 3 4\\n")
+    >>> read_groups("groups.txt").groupby("group")["id"].apply(list).tolist()
+    [[1, 2], [5, 3, 4]]
     """
-    return read_tracks(path, file_format="magni", max_gap=max_gap)
+    path = Path(path)
+    with reading(path, "as groups", "ids, a group a line"):
+        lines = read_small(path).decode("utf-8").splitlines()
+    groups: DisjointSet = DisjointSet()
+    joined = []
+    for number, line in enumerate(lines, start=1):
+        fields = line.split()
+        if not fields:
+            continue
+        if not all(field.isdecimal() for field in fields) or len(set(fields)) < 2:
+            raise DataError(f"{path}, line {number}: {line[:80]!r} is no group; expected two or more ids")
+        people = list(map(int, fields))
+        if any(person in groups for person in people):
+            joined.append(number)
+        for person in people:
+            groups.add(person)
+            groups.merge(people[0], person)
+    if joined:
+        where = ", ".join(map(str, joined))
+        warn(f"{path.name}: joined to earlier groups that share people: line {where}")
+    ids = list(groups)
+    table = pd.DataFrame(
+        {
+            "group": pd.factorize(np.array([groups[person] for person in ids]))[0],
+            "id": ids,
+        }
+    )
+    return table.astype("int64").sort_values("group", kind="stable", ignore_index=True)
 
 
 def read_magni_groups(path: str | Path) -> pd.DataFrame:
@@ -181,7 +199,7 @@ def read_magni_groups(path: str | Path) -> pd.DataFrame:
 
     Parameters
     ----------
-    path : as in `read_magni`.
+    path : CSV of THOR-MAGNI: Time [s], ag_id, x, y [m], data_label.
 
     Returns
     -------
@@ -192,12 +210,12 @@ def read_magni_groups(path: str | Path) -> pd.DataFrame:
 
     Raises
     ------
-    DataError : as in `read_magni`, or people do not make whole groups.
+    DataError : the file cannot be read, or people do not make whole groups.
 
     Examples
     --------
     >>> import pandas as pd
-    >>> from szlib.tracks import read_magni_groups
+    >>> from studies.sites import read_magni_groups
     >>> rows = pd.DataFrame({"Time": 0.4, "ag_id": ["Helmet_1", "Helmet_2"], "x": [0.0, 1.0], "y": 0.0})
     >>> rows.assign(data_label="Visitors-Group 2").to_csv("A.csv", index=False)
     >>> read_magni_groups("A.csv")["id"].tolist()
@@ -211,16 +229,12 @@ def read_magni_groups(path: str | Path) -> pd.DataFrame:
             continue
         size, left = int(match[1]), sorted(people["id"].unique())
         if len(left) % size:
-            raise DataError(
-                f"{path}: {len(left)} people are labelled {label!r} in session {session}"
-            )
+            raise DataError(f"{path}: {len(left)} people are labelled {label!r} in session {session}")
         at = people.pivot_table(index="t", columns="id", values=["x", "y"])
         while left:
             one = left.pop(0)
             distance = {
-                each: np.hypot(
-                    at["x"][one] - at["x"][each], at["y"][one] - at["y"][each]
-                ).median()
+                each: np.hypot(at["x"][one] - at["x"][each], at["y"][one] - at["y"][each]).median()
                 for each in left
             }
             nearest = sorted(left, key=distance.__getitem__)[: size - 1]
@@ -232,21 +246,15 @@ def read_magni_groups(path: str | Path) -> pd.DataFrame:
 
 def _homography(path: Path, homography: str | Path | None) -> np.ndarray:
     """The matrix of Grand Central, shape (3, 3)."""
-    places = (
-        [Path(homography)] if homography else [path.parent / "H.json", path / "H.json"]
-    )
+    places = [Path(homography)] if homography else [path.parent / "H.json", path / "H.json"]
     file = next((place for place in places if place.is_file()), None)
     if file is None:
         looked = " or ".join(map(str, places))
-        raise DataError(
-            f"{looked}: no such file; expected the homography of Grand Central, pass homography="
-        )
+        raise DataError(f"{looked}: no such file; expected the homography of Grand Central, pass homography=")
     with reading(file, "as a homography", "homog, 3 x 3"):
         matrix = np.array(json.loads(read_small(file))["homog"], float)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-        raise DataError(
-            f"{file}: homog has shape {matrix.shape}; expected 3 x 3 finite numbers"
-        )
+        raise DataError(f"{file}: homog has shape {matrix.shape}; expected 3 x 3 finite numbers")
     return matrix
 
 
@@ -254,19 +262,13 @@ def _annotations(path: Path) -> dict[str, bytes]:
     """Content of each file of Grand Central, by name."""
     with reading(path, "as annotations", "Annotation.zip or its folder"):
         if path.is_dir():
-            found = {
-                file.name: file.read_bytes() for file in sorted(path.glob("*.txt"))
-            }
+            found = {file.name: file.read_bytes() for file in sorted(path.glob("*.txt"))}
         else:
             with zipfile.ZipFile(path) as packed:
-                names = sorted(
-                    name for name in packed.namelist() if name.endswith(".txt")
-                )
+                names = sorted(name for name in packed.namelist() if name.endswith(".txt"))
                 found = {name.rsplit("/", 1)[-1]: packed.read(name) for name in names}
     if not found:
-        raise DataError(
-            f"{path}: holds no file *.txt; expected Annotation.zip or the folder of its files"
-        )
+        raise DataError(f"{path}: holds no file *.txt; expected Annotation.zip or the folder of its files")
     return found
 
 
@@ -281,18 +283,12 @@ def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, i
     parts = []
     for number, points in tracks:
         try:
-            rows = np.array(re.sub(r"[\[\];,]", " ", points).split(), float).reshape(
-                -1, 3
-            )
+            rows = np.array(re.sub(r"[\[\];,]", " ", points).split(), float).reshape(-1, 3)
         except ValueError as error:
-            raise DataError(
-                f"{path}, TRACK.R{number}: expected triples of x, y, frame ({error})"
-            ) from error
+            raise DataError(f"{path}, TRACK.R{number}: expected triples of x, y, frame ({error})") from error
         parts.append(np.column_stack([np.full(len(rows), int(number)), rows]))
     columns = np.concatenate(parts).T
-    blobs = pd.DataFrame(
-        dict(zip(("id", "column", "row", "frame"), columns, strict=True))
-    )
+    blobs = pd.DataFrame(dict(zip(("id", "column", "row", "frame"), columns, strict=True)))
     repeated = blobs.duplicated(["column", "row", "frame"]) & ~blobs.duplicated()
     blobs = blobs[~repeated]
     raw = pd.DataFrame(
@@ -307,9 +303,7 @@ def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, i
     return raw, int(repeated.sum())
 
 
-def _finish(
-    raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]
-) -> pd.DataFrame:
+def _finish(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]) -> pd.DataFrame:
     """The track table of rows from which some were `rejected` before."""
     finite = np.isfinite(raw[["t", "x", "y"]].to_numpy(float)).all(axis=1)
     doubled = raw.duplicated(["day", "id", "t"]).to_numpy() & finite
@@ -321,7 +315,5 @@ def _finish(
         "not finite": int((~finite).sum()),
         "second position at a time": int(doubled.sum()),
     }
-    stage = funnels.stage(
-        f"read {name}", len(raw) + sum(rejected.values()), len(usable), reasons
-    )
+    stage = funnels.stage(f"read {name}", len(raw) + sum(rejected.values()), len(usable), reasons)
     return to_clock(funnels.attach(usable, [stage]), max_gap=max_gap)

@@ -10,9 +10,9 @@ import pytest
 from helpers.thinning import measure_thinning_error
 from helpers.track_files import as_1hz, as_tidy
 from helpers.track_tables import make_tracks, make_walk, real_data
+from studies import quality
 
 import szlib
-from szlib.tracks import quality
 
 BEGIN = 1351040400.0  # 10:00 in Japan
 LINE = "{:.3f},{},{},{},1650.0,{},0.1,0.1\n"
