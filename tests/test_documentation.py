@@ -31,6 +31,7 @@ def module_names() -> Iterator[str]:
             yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
     for path in sorted((PACKAGE.parent / "notebooks" / "plots").glob("[!_]*.py")):
         yield f"plots.{path.stem}"
+    yield from ("costmaps", "studies.imposed_zone", "studies.pooling")
 
 
 MODULES = list(module_names())

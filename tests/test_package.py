@@ -36,13 +36,13 @@ DRAWN = {
 PUBLIC = [
     "ATC_SQUARE", "AttentionalSpace", "DataError", "DataWarning", "DifferentialDrive", "Ellipse",
     "EncounterSettings", "Recipe",
-    "Extraction", "Grid", "MEETINGS", "MPCCBF", "MPCSettings", "NullEncounters", "NullTest",
-    "PairCorrelation", "Person", "PlazaSettings", "Pooled", "ReferenceZone", "Region",
+    "Extraction", "MEETINGS", "MPCCBF", "MPCSettings", "NullEncounters", "NullTest",
+    "Person", "PlazaSettings", "ReferenceZone", "Region",
     "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",
-    "ZoneError", "as_area", "draw_costmap", "ellipse_distance", "encounter_kinds", "extract_days",
-    "find_encounters", "find_pairs", "impose_zone", "make_plaza", "minimum_enclosing_ellipse",
-    "null_encounters", "null_pairs", "null_test", "of_kind", "pair_correlation", "pool", "read_tracks",
+    "ZoneError", "as_area", "ellipse_distance", "encounter_kinds", "extract_days",
+    "find_encounters", "find_pairs", "make_plaza", "minimum_enclosing_ellipse",
+    "null_encounters", "null_pairs", "null_test", "of_kind", "read_tracks",
     "reference_zone", "remove_outliers",
     "rollouts", "segment_distance", "simulate", "time_shifted", "walked_area", "walls_from_map",
 ]  # fmt: skip

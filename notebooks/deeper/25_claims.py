@@ -70,6 +70,8 @@ from studies import zones as zones_study
 from studies.distances import compare_distances
 from studies.folds import fold_table
 from studies.plaza_truth import true_kinds
+from studies.pooling import pool
+from studies.sensitivity import sensitivity
 
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
@@ -77,7 +79,6 @@ import szlib
 from szlib.workbook import figures, paper_sentences
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 from szlib.zones.outliers import is_outlier
-from szlib.zones.sensitivity import sensitivity
 
 record = NotebookRecord("25_claims", globals())
 parameters(
@@ -351,7 +352,7 @@ fold_table(
 #
 # People on a plaza follow our rules. On real paths the truth is unknown. So we put one there: real people are shifted in time,
 # so that they ignore each other; then each pair is removed in which one person enters the other's ellipse, except for a
-# share of careless pairs (`szlib.impose_zone`). What is left keeps a **known zone on real paths**.
+# share of careless pairs (`studies.imposed_zone`). What is left keeps a **known zone on real paths**.
 #
 # Which of the two estimators finds it (`python -m studies.imposed 6`)?
 
@@ -445,14 +446,14 @@ Markdown(
 # ## Several sites
 #
 # How near do strangers come elsewhere? Below are the radii of respect of chapter 06, all directions pooled. A
-# random-effects model (`szlib.pool`) adds the mean over sites, and from three sites on what to expect at a new one.
+# random-effects model (`studies.pooling`) adds the mean over sites, and from three sites on what to expect at a new one.
 
 # %% jupyter={"source_hidden": true}
 # Figure
 radii = read_table("06_sites").query("kinds == 'strangers' and site != 'plaza'").set_index("site")
 radii = radii.rename({"atc-1hz": "ATC mall", "grand-central": "Grand Central"})
 sites = {name: tuple(row) for name, row in radii[["radius", "radius_low", "radius_high"]].iterrows()}
-pooled = szlib.pool(sites)
+pooled = pool(sites)
 ax = plots.plot_forest(pooled)
 ax.set(xlim=(0.4, 2), xlabel="radius that strangers respect [m], with 95 % intervals")
 ax.set_xticks([0.5, 0.75, 1, 1.5, 2], ["0.5", "0.75", "1", "1.5", "2"])

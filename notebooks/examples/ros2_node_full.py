@@ -21,7 +21,7 @@ than `timeout` by their own stamps. Silence about people does not mean that nobo
 sees nobody has to publish an empty list. If this node itself dies, only the base can stop the robot: its
 driver must do so when cmd_vel falls silent.
 
-Copy ros2_node.py as well. Both are tested without ROS by tests/control/test_ros2_node.py.
+Copy ros2_node.py and costmaps.py as well. All are tested without ROS by tests/control/test_ros2_node.py.
 """
 
 from math import atan2, nan
@@ -29,6 +29,7 @@ from math import atan2, nan
 import numpy as np
 import rclpy
 import ros2_node
+from costmaps import Grid, draw_costmap
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.executors import ExternalShutdownException
@@ -157,7 +158,7 @@ class FullSocialDrive(ros2_node.SocialDrive):
         """The costmap of people's zones, in a square around the robot."""
         side, cells = self.costmap_resolution, round(self.costmap_size / self.costmap_resolution)
         corner = [side * round(c / side) - side * (cells // 2) for c in self.own[:2].tolist()]
-        costs = szlib.draw_costmap(self.zone_around, people, szlib.Grid(corner, side, (cells, cells)))
+        costs = draw_costmap(self.zone_around, people, Grid(corner, side, (cells, cells)))
         message = OccupancyGrid()
         message.header.frame_id, message.header.stamp = self.frame, self.people_stamp
         message.info.resolution, message.info.width, message.info.height = side, cells, cells

@@ -4,7 +4,7 @@ comparisons  many runs or fits: sweeps, strategies, intervals, claims, sites (no
 control      the error of a distance, and the ways of a step (notebooks 22, 12)
 encounters   paths, an encounter in motion, and where the other person is (notebook 02)
 tracks       speeds, and the rows that each stage keeps (notebook 24)
-zones        outliers, the hull, the pair correlation (notebook 04)
+zones        outliers, the hull (notebooks 03, 04)
 """
 
 from .comparisons import (
@@ -25,4 +25,4 @@ from .encounters import (
     plot_relative_positions,
 )
 from .tracks import plot_funnel, plot_speed_histogram
-from .zones import plot_hull, plot_outliers, plot_pair_correlation
+from .zones import plot_hull, plot_outliers

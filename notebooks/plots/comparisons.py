@@ -11,10 +11,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
+from studies.pooling import POSITIVE, UNITS, Pooled
 
 from szlib.workbook.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from szlib.workbook.figures.style import add_legend_below, add_shared_legend, get_axes
-from szlib.zones.pooling import POSITIVE, UNITS, Pooled
 
 # Colour and hatching of each kind of safety violation.
 _BARS = {
@@ -216,7 +216,7 @@ def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    table : table as from `szlib.zones.sensitivity.sensitivity`: parameter, value, area [m2]; the first row
+    table : table as from `studies.sensitivity.sensitivity`: parameter, value, area [m2]; the first row
         holds the defaults.
     ax : axes to draw on; None makes new ones.
 
@@ -298,15 +298,15 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    pooled : result of `szlib.pool`. The mean is a diamond as wide as its interval, and the prediction
+    pooled : result of `studies.pooling.pool`. The mean is a diamond as wide as its interval, and the prediction
         interval of a new site a line below it. With two sites both say nothing, and only the mean is drawn.
     ax : axes to draw on; None makes new ones.
 
     Examples
     --------
-    >>> import szlib
     >>> import plots
-    >>> ax = plots.plot_forest(szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}))
+    >>> from studies.pooling import pool
+    >>> ax = plots.plot_forest(pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}))
     """
     n, sites = pooled.n_sites, pooled.table.set_index("site")[["value", "low", "high"]]
     labels = [f"{name}: {mid:.2f} ({low:.2f} to {high:.2f})" for name, mid, low, high in sites.itertuples()]

@@ -1,4 +1,4 @@
-"""Figures of zones: outliers, the hull and its slices, the pair correlation (notebooks 03, 04, 06)."""
+"""Figures of zones: outliers, the hull and its slices (notebooks 03, 04)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from scipy.spatial import ConvexHull
 
 from szlib.core.errors import ZoneError
 from szlib.workbook.figures.palette import BLACK, BLUE, GREY, RED, pick_colours
-from szlib.workbook.figures.style import add_legend_below, draw_person, get_axes, label_metres
+from szlib.workbook.figures.style import add_legend_below, get_axes, label_metres
 from szlib.zones.hulls import HullZone
-from szlib.zones.occupancy import PairCorrelation
 from szlib.zones.social_zone import SocialZone
 
 
@@ -153,38 +152,3 @@ def plot_hull(
     ax.legend(loc="upper left", fontsize=8)
     ax.view_init(elev=18, azim=-60)
     return ax
-
-
-def plot_pair_correlation(
-    correlation: PairCorrelation, *, radius: float | None = None, ax: Axes | None = None
-) -> Axes:
-    """Plot g: the density of people over their density in the null model.
-
-    Parameters
-    ----------
-    correlation : result of `szlib.pair_correlation`.
-    radius : radius of the respect zone over all directions [m], if it is to be drawn.
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import numpy as np, szlib
-    >>> import plots
-    >>> direction, distance = np.linspace(0.1, 6.1, 36), np.linspace(0.05, 1.95, 40)
-    >>> g = np.tile(distance > 0.8, (36, 1)).astype(float)
-    >>> ax = plots.plot_pair_correlation(szlib.PairCorrelation(distance, direction, g), radius=0.8)
-    """
-    ax = get_axes(ax, size=(6, 4.8))
-    turn = np.r_[correlation.direction, correlation.direction[0] + 2 * np.pi]
-    g = np.vstack([correlation.g, correlation.g[:1]])
-    x, y = (correlation.distance * part(turn)[:, None] for part in (np.cos, np.sin))
-    image = ax.pcolormesh(x, y, g, cmap="PuOr", vmin=0, vmax=2, shading="gouraud", rasterized=True)
-    ax.figure.colorbar(image, ax=ax, label="g (1: as often as without interaction)")
-    ax.contour(x, y, np.nan_to_num(g, nan=1.0), levels=[0.5], colors=[BLACK], linewidths=1.5)
-    ax.plot([], [], color=BLACK, linewidth=1.5, label="g = 1/2")
-    if radius is not None:
-        ax.add_patch(Circle((0, 0), radius, fill=False, linestyle="--", color=BLUE, linewidth=2))
-        ax.plot([], [], "--", color=BLUE, label=f"all directions: {radius:.2f} m")
-    draw_person(ax, 0, 0, 0, color=RED, markersize=10)
-    add_legend_below(ax)
-    return label_metres(ax, person=True)

@@ -30,12 +30,13 @@ from studies import paper_claims as claims
 from studies import sites
 from studies.committed import study, write_table
 from studies.plaza_truth import true_kinds
+from studies.pooling import pool
 from studies.respect import stored
+from studies.sensitivity import FIT, sensitivity
 
 import szlib
 from szlib.workbook import figures
 from szlib.zones.outliers import is_outlier
-from szlib.zones.sensitivity import FIT, sensitivity
 
 DATA = Path(os.environ.get("SZLIB_DATA_DIR", "."))
 KIND = "strangers"
@@ -127,7 +128,7 @@ def pool_sites(table: pd.DataFrame) -> pd.DataFrame:
             claim, np.nan, np.nan, np.nan, part["unit"].iloc[0], len(known), reason=ONE_SITE
         )
         if len(known) > 1:  # differences are pooled as they are, like centres
-            pooled = szlib.pool(dict(zip(known.index, known.to_numpy(), strict=True)), quantity="center_x")
+            pooled = pool(dict(zip(known.index, known.to_numpy(), strict=True)), quantity="center_x")
             found = replace(found, effect=pooled.mean, low=pooled.low, high=pooled.high, reason="")
         rows.append(found)
     return claims.tabulate_findings(rows, data="mean of sites").assign(

@@ -4,7 +4,7 @@ python -m studies.imposed 6      25_imposed.csv
 
 Takes the number of draws of each case.  The table goes to notebooks/tables.  The real data is looked for in
 $SZLIB_DATA_DIR (atc-1hz/ and gc/).  The people of a time-shifted crowd get a known zone
-(`szlib.impose_zone`); the other shifts are the null model.  Rows of the site "plaza" are computed again in each
+(`studies.imposed_zone`); the other shifts are the null model.  Rows of the site "plaza" are computed again in each
 run of notebook 25.
 """
 
@@ -23,10 +23,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from studies.committed import study, write_table
+from studies.imposed_zone import PairedSamples
 from studies.respect import data_and_null
 
 import szlib
-from szlib.zones import PairedSamples
 
 SPEED = 1.1
 TRUTHS = {

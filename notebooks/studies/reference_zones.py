@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from studies.pooling import pool
 from studies.respect import data_and_null
 
 import szlib
@@ -97,7 +98,7 @@ def describe(name: str, zone: szlib.SocialZone) -> dict[str, Any]:
 def describe_pooled(zones: dict[str, szlib.SocialZone]) -> dict[str, Any]:
     """The entry of the circle with the mean radius of respect of all sites."""
     radii = {name: zone.null_test.respect for name, zone in zones.items()}
-    pooled = szlib.pool({name: (each.radius, each.low, each.high) for name, each in radii.items()})
+    pooled = pool({name: (each.radius, each.low, each.high) for name, each in radii.items()})
     radius = round(pooled.mean, 3)
     return {
         "ellipse": {"center": [0.0, 0.0], "semi_axes": [radius, radius], "angle": 0.0},

@@ -7,7 +7,6 @@ estimators            what all estimators and shapes of zones have in common
 polar                 a zone given as a radius in each direction, and the ellipse fitted to it
 hulls                 the zone outside the convex hull over (x', y', speed): estimator "hull"
 quantile              the zone that all but a share of encounters stay outside: estimator "quantile"
-occupancy             the map of the pair correlation
 respect               the ellipse that careful people keep out of, by the null model: estimator "respect"
 respect_likelihood    its likelihood, and the posterior of its parameters
 respect_profile       its radius from nearest approaches, all directions pooled, with an interval
@@ -16,11 +15,7 @@ uncertainty           encounters by side, and confidence intervals by resampling
 verdict               whether a zone can be used, and why not
 zone_file             the JSON file of a social zone
 social_zone           `SocialZone`: all of it behind one name
-imposed_zone          a known zone on recorded paths, to test estimators with: `impose_zone`
-costmaps              zones around people as a costmap, for navigation stacks
-pooling               a quantity of the zones of several sites, pooled: `pool`
 reference_zones       zones of real people that szlib ships: `reference_zone`
-sensitivity           the zone with each parameter of the method varied alone
 
 `__init__.pyi` beside this file lists the names. Each is imported when it is first used: a robot that needs an
 `Ellipse` loads no pandas.

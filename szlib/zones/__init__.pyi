@@ -1,15 +1,11 @@
-from .costmaps import Grid, draw_costmap
 from .ellipses import BODY_RADIUS, Ellipse, circle_around
 from .enclosing_ellipse import (
     minimum_enclosing_ellipse,
     minimum_enclosing_ellipse_of_curve,
 )
 from .hulls import HullZone, hull_vertices, slice_hull
-from .imposed_zone import PairedSamples, impose_zone
-from .occupancy import PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
-from .pooling import Pooled, pool
 from .reference_zones import ReferenceZone, reference_zone
 from .respect_profile import RespectRadius
 from .respect_significance import NullTest, null_test
@@ -19,28 +15,20 @@ from .uncertainty import count_by_side
 __all__ = [
     "BODY_RADIUS",
     "Ellipse",
-    "Grid",
     "HullZone",
     "NullTest",
-    "PairCorrelation",
-    "PairedSamples",
     "PolarZone",
-    "Pooled",
     "ReferenceZone",
     "RespectRadius",
     "SocialZone",
     "circle_around",
     "complementary_points",
     "count_by_side",
-    "draw_costmap",
     "hull_vertices",
-    "impose_zone",
     "is_outlier",
     "minimum_enclosing_ellipse",
     "minimum_enclosing_ellipse_of_curve",
     "null_test",
-    "pair_correlation",
-    "pool",
     "reference_zone",
     "remove_outliers",
     "slice_hull",

@@ -26,7 +26,7 @@ power 1 / (1 + n/m) for n encounters of the data and m of the null model, becaus
 meant to contain the true zone. People differ from the model, so centre ahead and semi-axis along the motion
 have a standard deviation of at least 5 cm, the semi-axis across of at least 1.2 cm.
 
-Measured on zones imposed on real paths (`szlib.impose_zone`): notebook 25.
+Measured on zones imposed on real paths: notebook 25.
 """
 
 from __future__ import annotations

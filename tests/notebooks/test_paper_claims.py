@@ -9,10 +9,10 @@ from helpers.passing_pairs import null_of, passing_pairs, respecting
 from studies import chains as chains_study
 from studies import paper_claims as claims
 from studies.claims import measure_density
+from studies.sensitivity import sensitivity
 
 import szlib
 from szlib.zones import sampling
-from szlib.zones.sensitivity import sensitivity
 
 
 def finding(low: float, high: float) -> claims.Finding:

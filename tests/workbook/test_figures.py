@@ -12,6 +12,7 @@ import pandas as pd
 import plots
 import pytest
 from PIL import Image
+from studies.pooling import pool
 from studies.safety_claims import MOTION_CHANGES
 
 import szlib
@@ -387,18 +388,6 @@ def test_alt_text_holds_titles_axes_and_legends():
 # --- respect, claims, sensitivity, many runs ----------------------------------------------------------
 
 
-def test_the_pair_correlation_is_in_metres_and_names_its_radius():
-    direction, distance = np.linspace(0.1, 6.1, 36), np.linspace(0.05, 1.95, 40)
-    g = np.tile(1 / (1 + np.exp(-(distance - 0.8) / 0.1)), (36, 1))
-    ax = plots.plot_pair_correlation(
-        szlib.PairCorrelation(distance, direction, g), radius=0.8
-    )
-    assert in_metres(ax)
-    assert "all directions: 0.80 m" in [
-        text.get_text() for text in ax.get_legend().get_texts()
-    ]
-
-
 def test_each_zone_size_has_a_band():
     sizes = {"a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
     ax = plots.plot_zone_sizes(
@@ -476,7 +465,7 @@ def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():
         "lab": (0.6, 0.5, 0.7),
         "yard": (1.0, 0.7, 1.4),
     }
-    pooled = szlib.pool(sites)
+    pooled = pool(sites)
     ax = plots.plot_forest(pooled)
     labels = [label.get_text() for label in ax.get_yticklabels()]
     assert [label.partition(":")[0] for label in labels] == [
@@ -493,9 +482,7 @@ def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():
     assert (diamond.min(), diamond.max()) == (pooled.low, pooled.high)
     assert ax.lines[-1].get_xdata().tolist() == [pooled.new_low, pooled.new_high]
     few = plots.plot_forest(
-        szlib.pool(
-            {name: sites[name] for name in ("hall", "mall")}, quantity="center_x"
-        )
+        pool({name: sites[name] for name in ("hall", "mall")}, quantity="center_x")
     )
     assert len(few.get_yticklabels()) == 3 and few.get_xscale() == "linear"
 

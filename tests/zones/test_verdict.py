@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from studies.imposed_zone import PairedSamples
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
@@ -289,7 +290,7 @@ def test_cores_in_simulated_crowds_are_found() -> None:
     tracks = noninteracting_crowd(seed=5, people=1500, minutes=30)
     samples = szlib.find_encounters(tracks)
     against = szlib.null_encounters(tracks, shifts=19, progress=False)
-    paired = szlib.zones.PairedSamples.from_samples(samples)
+    paired = PairedSamples.from_samples(samples)
     kept = paired.impose(szlib.Ellipse((0, 0), (0.8, 0.8)), careless=0.05, seed=1)
     test = szlib.null_test(kept, against)
     assert test.is_significant

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import make_tracks, make_walk
+from studies.imposed_zone import PairedSamples, impose_zone
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.encounters.samples import match_rows
 from szlib.tracks import funnels
-from szlib.zones import PairedSamples
 
 ZONE = szlib.Ellipse((0.15, 0.05), (0.9, 0.6), 0.3)
 MINUTES, SETTINGS = (
@@ -59,7 +59,7 @@ def test_nobody_within_the_zone_remains_and_everybody_else_does(
     everybody = szlib.find_encounters(shifted, settings=SETTINGS, kinds="crossing")
     expected = entering(shifted, everybody)
     assert len(expected) > 20
-    imposed = szlib.impose_zone(
+    imposed = impose_zone(
         tracks, ZONE, seed=2, minutes=MINUTES, settings=SETTINGS, kinds="crossing"
     )
     pd.testing.assert_frame_equal(
@@ -125,7 +125,7 @@ def test_a_turned_and_moved_world_changes_nothing(
     )
     (x0, x1), (y0, y1) = szlib.ATC_SQUARE.x, szlib.ATC_SQUARE.y
     square = szlib.Square(x=(30 - y1, 30 - y0), y=(x0 - 7, x1 - 7))
-    found = szlib.impose_zone(
+    found = impose_zone(
         turned.sample(frac=1, random_state=0), ZONE, careless=0.2, seed=2, minutes=MINUTES, area=square,
         min_distance=0.3,
     )  # fmt: skip
@@ -151,7 +151,7 @@ def test_a_standing_person_has_no_zone_but_is_kept_out_of_others() -> None:
 
 def test_without_encounters_the_result_is_empty(tracks: pd.DataFrame) -> None:
     far = szlib.EncounterSettings(area="100 120 100 120")
-    imposed = szlib.impose_zone(tracks, ZONE, minutes=MINUTES, settings=far)
+    imposed = impose_zone(tracks, ZONE, minutes=MINUTES, settings=far)
     assert len(imposed) == 0
     assert funnels.get(imposed)[-1]["entered"] == 0
 
@@ -167,4 +167,4 @@ def test_invalid_arguments_raise(tracks: pd.DataFrame, paired: PairedSamples) ->
     ):
         paired.impose((0.9, 0.6))  # type: ignore[arg-type]
     with pytest.raises(szlib.DataError, match="too short for shifts"):
-        szlib.impose_zone(tracks, ZONE, minutes=(1, 50))
+        impose_zone(tracks, ZONE, minutes=(1, 50))

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 import shapely
+from costmaps import FADE, Grid, draw_costmap
 
 import szlib
-from szlib.zones.costmaps import FADE, draw_costmap
 from szlib.zones.ellipses import BODY_RADIUS, circle_around
 from szlib.zones.polar import DIRECTIONS, PolarZone
 
 ZONE = szlib.Ellipse((0.2, -0.1), (1.0, 0.6), 0.4)
-GRID = szlib.Grid((-4.0, -3.0), 0.1, (60, 80))
+GRID = Grid((-4.0, -3.0), 0.1, (60, 80))
 
 
 def polygon(zone, n=4000):
@@ -41,7 +41,7 @@ def compute_cell_by_cell(people, grid, zone):
 
 
 def test_costs_equal_a_computation_cell_by_cell():
-    grid = szlib.Grid((-2.5, -1.0), 0.17, (18, 25))
+    grid = Grid((-2.5, -1.0), 0.17, (18, 25))
     people = np.array(
         [[0.0, 0.0, 0.5, 0.2], [1.3, 0.4, -0.4, 0.0], [-2.4, 1.9, 0.3, -0.9]]
     )
@@ -72,7 +72,7 @@ def test_rows_are_y_and_columns_are_x():
     costs = draw_costmap(
         ZONE,
         [[1.96, -1.04, 1.0, 0.0]],
-        szlib.Grid((0.0, -2.0), 0.1, (20, 50)),
+        Grid((0.0, -2.0), 0.1, (20, 50)),
         fade=0.0,
     )
     assert costs[9, 19] == 100
@@ -85,12 +85,12 @@ def test_rows_are_y_and_columns_are_x():
 def test_costmap_moves_and_rotates_with_the_people():
     rng = np.random.default_rng(1)
     people = np.column_stack([rng.uniform(-2, 2, (4, 2)), rng.uniform(-1, 1, (4, 2))])
-    grid = szlib.Grid((-3.2, -3.2), 0.1, (64, 64))
+    grid = Grid((-3.2, -3.2), 0.1, (64, 64))
     costs = draw_costmap(ZONE, people, grid)
     moved = draw_costmap(
         ZONE,
         people + np.array([0.3, -0.5, 0, 0]),
-        szlib.Grid((-2.9, -3.7), 0.1, (64, 64)),
+        Grid((-2.9, -3.7), 0.1, (64, 64)),
     )
     turned = draw_costmap(ZONE, people[:, [1, 0, 3, 2]] * [-1, 1, -1, 1], grid)
     # a cell whose cost is a half may round either way
@@ -143,7 +143,7 @@ def test_costmap_without_people_is_empty(empty):
 
 
 def test_costs_do_not_depend_on_the_grid_border():
-    large = szlib.Grid((-8.0, -7.0), 0.1, (140, 160))
+    large = Grid((-8.0, -7.0), 0.1, (140, 160))
     people = [[-4.3, 0.0, 1.0, 0.0], [30.0, 0.0, 1.0, 0.0], [4.2, 3.3, 0.0, -1.0]]
     assert np.array_equal(
         draw_costmap(ZONE, people, GRID),
@@ -163,10 +163,10 @@ def test_invalid_arguments_are_refused():
         ((0, 0), 0.0, (5, 5)), ((0, np.inf), 0.1, (5, 5)), ((0, 0), 0.1, (5, 0)), ((0, 0), 0.1, (5.0, 5)),
     ]:  # fmt: skip
         with pytest.raises(szlib.ZoneError, match="a grid"):
-            szlib.Grid(origin, resolution, shape)
+            Grid(origin, resolution, shape)
 
 
 def test_a_grid_may_have_one_row_or_one_cell() -> None:
     for shape in ((1, 5), (5, 1), (1, 1)):
-        grid = szlib.Grid(origin=(0.0, 0.0), resolution=0.1, shape=shape)
+        grid = Grid(origin=(0.0, 0.0), resolution=0.1, shape=shape)
         assert grid.centers().shape == (*shape, 2)

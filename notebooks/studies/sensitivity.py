@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..core.errors import DataError, DataWarning, ZoneError
-from ..encounters.finding import find_encounters
-from ..encounters.geometry import Area
-from ..encounters.near_rows import select_near_rows
-from .outliers import FRACTION, N_NEIGHBOURS
-from .social_zone import SocialZone
+from szlib.core.errors import DataError, DataWarning, ZoneError
+from szlib.encounters.finding import find_encounters
+from szlib.encounters.geometry import Area
+from szlib.encounters.near_rows import select_near_rows
+from szlib.zones.outliers import FRACTION, N_NEIGHBOURS
+from szlib.zones.social_zone import SocialZone
 
 # Values of `szlib.find_encounters`, besides its defaults.
 SEARCH: Mapping[str, Sequence[Any]] = {
@@ -69,27 +69,21 @@ def sensitivity(
         try:
             # The number of encounters is in the table.
             with warnings.catch_warnings(action="ignore", category=DataWarning):
-                (ellipse,) = SocialZone.fit(
-                    samples, **(usual | options)
-                ).ellipses.values()
+                (ellipse,) = SocialZone.fit(samples, **(usual | options)).ellipses.values()
             sizes = (*ellipse.semi_axes, ellipse.area)
         except (ZoneError, DataError):
             if not rows:
                 raise
         text = ", ".join(value) if isinstance(value, tuple) else str(value)
         rows.append((parameter, text, samples["encounter"].nunique(), *sizes))
-    return pd.DataFrame(
-        rows, columns=["parameter", "value", "encounters", "a", "b", "area"]
-    )
+    return pd.DataFrame(rows, columns=["parameter", "value", "encounters", "a", "b", "area"])
 
 
 def _variations(
     tracks: pd.DataFrame, area: Area, has_walls: bool, fit: Mapping[str, Sequence[Any]]
 ) -> Iterator[tuple[str, Any, pd.DataFrame, dict[str, Any]]]:
     """Parameter, value, samples and options of the fit, for each variation."""
-    search = partial(
-        find_encounters, select_near_rows(tracks, area, max(SEARCH["duration"]))
-    )
+    search = partial(find_encounters, select_near_rows(tracks, area, max(SEARCH["duration"])))
     samples = search(area=area, has_walls=has_walls)
     yield "default", "", samples, {}
     for name, values in SEARCH.items():

@@ -19,9 +19,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.checks import Array
-from ..core.errors import ZoneError
-from .ellipses import BODY_RADIUS, Ellipse, circle_around
+from szlib.core.checks import Array
+from szlib.core.errors import ZoneError
+from szlib.zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 
 FADE = 0.5  # distance from a zone at which its cost reaches 0 [m] (assumed)
 # speed above which the velocity gives the heading of a person [m/s] (assumed)
@@ -48,8 +48,8 @@ class Grid:
 
     Examples
     --------
-    >>> import szlib
-    >>> grid = szlib.Grid(origin=(-2.0, -2.0), resolution=0.1, shape=(40, 40))
+    >>> from costmaps import Grid
+    >>> grid = Grid(origin=(-2.0, -2.0), resolution=0.1, shape=(40, 40))
     >>> grid.centers()[0, 0].round(2).tolist()
     [-1.95, -1.95]
     """
@@ -60,19 +60,13 @@ class Grid:
 
     def __post_init__(self) -> None:
         origin, resolution = np.asarray(self.origin, float), float(self.resolution)
-        if (
-            origin.shape != (2,)
-            or not np.isfinite([*origin, resolution]).all()
-            or resolution <= 0
-        ):
+        if origin.shape != (2,) or not np.isfinite([*origin, resolution]).all() or resolution <= 0:
             raise ZoneError(
                 f"a grid needs an origin (x, y) and a resolution > 0; got {self.origin}, {self.resolution}"
             )
         shape = np.asarray(self.shape)
         if shape.shape != (2,) or shape.dtype.kind not in "iu" or (shape < 1).any():
-            raise ZoneError(
-                f"a grid's shape must be (rows, columns), whole numbers >= 1; got {self.shape}"
-            )
+            raise ZoneError(f"a grid's shape must be (rows, columns), whole numbers >= 1; got {self.shape}")
         object.__setattr__(self, "origin", (float(origin[0]), float(origin[1])))
         object.__setattr__(self, "resolution", resolution)
         object.__setattr__(self, "shape", (int(shape[0]), int(shape[1])))
@@ -87,17 +81,9 @@ class Grid:
     def window(self, center: tuple[float, float], radius: float) -> tuple[slice, slice]:
         """Rows and columns of all cells that may lie within `radius` of the point `center` [m]."""
         ends = []
-        for middle, corner, cells in zip(
-            center[::-1], self.origin[::-1], self.shape, strict=True
-        ):
-            first, last = (
-                (middle + side - corner) / self.resolution for side in (-radius, radius)
-            )
-            ends.append(
-                slice(
-                    int(np.clip(first - 1, 0, cells)), int(np.clip(last + 1, 0, cells))
-                )
-            )
+        for middle, corner, cells in zip(center[::-1], self.origin[::-1], self.shape, strict=True):
+            first, last = ((middle + side - corner) / self.resolution for side in (-radius, radius))
+            ends.append(slice(int(np.clip(first - 1, 0, cells)), int(np.clip(last + 1, 0, cells))))
         return ends[0], ends[1]
 
 
@@ -135,27 +121,22 @@ def draw_costmap(
     Examples
     --------
     >>> import szlib
+    >>> from costmaps import Grid, draw_costmap
     >>> zone = szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))
-    >>> grid = szlib.Grid(origin=(-2.0, -2.0), resolution=0.5, shape=(8, 8))
-    >>> costs = szlib.draw_costmap(zone, [[0.25, 0.25, 1.0, 0.0]], grid)
+    >>> grid = Grid(origin=(-2.0, -2.0), resolution=0.5, shape=(8, 8))
+    >>> costs = draw_costmap(zone, [[0.25, 0.25, 1.0, 0.0]], grid)
     >>> int(costs[4, 4]), int(costs[4, 5]), int(costs[0, 0])  # the body, the zone, far away
     (100, 79, 0)
     """
     if not (np.isfinite([fade, body_radius]).all() and min(fade, body_radius) >= 0):
-        raise ZoneError(
-            f"fade and body_radius must be finite and >= 0 [m]; got {fade}, {body_radius}"
-        )
+        raise ZoneError(f"fade and body_radius must be finite and >= 0 [m]; got {fade}, {body_radius}")
     costs = np.zeros(grid.shape, np.int8)
     common = _as_ellipse(zone, speed)
     for (x, y), heading, own_zone in _read_people(people):
         ellipse = common if own_zone is None else _as_ellipse(own_zone, speed)
-        placed = (circle_around(ellipse) if heading is None else ellipse).placed(
-            (x, y), heading or 0.0
-        )
+        placed = (circle_around(ellipse) if heading is None else ellipse).placed((x, y), heading or 0.0)
         offset = hypot(placed.center[0] - x, placed.center[1] - y)
-        window = grid.window(
-            placed.center, max(offset + body_radius, placed.semi_axes[0] + fade)
-        )
+        window = grid.window(placed.center, max(offset + body_radius, placed.semi_axes[0] + fade))
         points = grid.centers(*window)
         cost = _zone_cost(points, placed, fade)
         cost[np.hypot(*np.moveaxis(points - (x, y), -1, 0)) <= body_radius] = BODY_COST
@@ -167,39 +148,25 @@ def _zone_cost(points: Array, zone: Ellipse, fade: float) -> NDArray[np.int8]:
     """Cost of a zone at points (..., 2), 0 to 99."""
     share = np.sqrt(zone.level(points))  # of the way from the centre to the boundary
     inside = np.rint(CENTER_COST - (CENTER_COST - BOUNDARY_COST) * share)
-    distance = np.hypot(*np.moveaxis(points - zone.center, -1, 0)) * (
-        1 - 1 / np.maximum(share, 1)
-    )
-    outside = (
-        np.floor(BOUNDARY_COST * (1 - distance / fade))
-        if fade
-        else np.zeros_like(share)
-    )
-    return np.asarray(
-        np.where(share <= 1, inside, np.clip(outside, 0, BOUNDARY_COST - 1)), np.int8
-    )
+    distance = np.hypot(*np.moveaxis(points - zone.center, -1, 0)) * (1 - 1 / np.maximum(share, 1))
+    outside = np.floor(BOUNDARY_COST * (1 - distance / fade)) if fade else np.zeros_like(share)
+    return np.asarray(np.where(share <= 1, inside, np.clip(outside, 0, BOUNDARY_COST - 1)), np.int8)
 
 
 def _read_people(
     people: Sequence[Any] | ArrayLike,
 ) -> Iterator[tuple[tuple[float, float], float | None, Any]]:
     """Position, heading (None: unknown) and own zone (None: none) of each person."""
-    rows = (
-        people if isinstance(people, np.ndarray) else list(cast(Sequence[Any], people))
-    )
+    rows = people if isinstance(people, np.ndarray) else list(cast(Sequence[Any], people))
     if len(rows) and all(hasattr(row, "position") for row in rows):
         yield from ((row.position, row.heading, row.zone) for row in rows)
         return
     table = np.asarray(rows, float)
     if table.size and (table.ndim != 2 or table.shape[1] != 4):
-        raise ZoneError(
-            f"people must be Persons, or an array (n, 4): x, y, vx, vy; got {table.shape}"
-        )
+        raise ZoneError(f"people must be Persons, or an array (n, 4): x, y, vx, vy; got {table.shape}")
     for i, (x, y, vx, vy) in enumerate(table.reshape(-1, 4).tolist()):
         if not np.isfinite([x, y, vx, vy]).all():
-            raise ZoneError(
-                f"people must be finite; person {i} is {[x, y, vx, vy]}: drop or repair it"
-            )
+            raise ZoneError(f"people must be finite; person {i} is {[x, y, vx, vy]}: drop or repair it")
         yield (
             (x, y),
             atan2(vy, vx) if hypot(vx, vy) >= MIN_HEADING_SPEED else None,

@@ -23,8 +23,8 @@ import pandas as pd
 from scipy.optimize import brentq
 from scipy.stats import norm, t
 
-from ..core.errors import ZoneError
-from .social_zone import SocialZone
+from szlib.core.errors import ZoneError
+from szlib.zones.social_zone import SocialZone
 
 POSITIVE = ("radius", "a", "b", "area")  # pooled as logarithms
 UNITS = dict.fromkeys([*POSITIVE, "center_x", "center_y"], "m") | {"area": "m2"}
@@ -46,8 +46,8 @@ class Pooled:
 
     Examples
     --------
-    >>> import szlib
-    >>> print(szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}).table.round(2))
+    >>> from studies.pooling import pool
+    >>> print(pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}).table.round(2))
        site  value  low  high  weight
     0  hall    0.9  0.8   1.0    0.52
     1  mall    1.2  1.0   1.4    0.48
@@ -75,9 +75,7 @@ class Pooled:
         )
 
 
-def pool(
-    sites: Mapping[str, Any], *, quantity: str = "radius", speed: float = 1.1
-) -> Pooled:
+def pool(sites: Mapping[str, Any], *, quantity: str = "radius", speed: float = 1.1) -> Pooled:
     """Pool a quantity of several sites by a random-effects model.
 
     Parameters
@@ -99,22 +97,16 @@ def pool(
 
     Examples
     --------
-    >>> import szlib
-    >>> pooled = szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4), "lab": (0.6, 0.5, 0.7)})
+    >>> from studies.pooling import pool
+    >>> pooled = pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4), "lab": (0.6, 0.5, 0.7)})
     >>> pooled.n_sites, round(pooled.mean, 2), round(pooled.low, 2), round(pooled.high, 2)
     (3, 0.87, 0.37, 2.05)
     """
     if quantity not in UNITS:
-        raise ZoneError(
-            f"quantity {quantity!r} cannot be pooled; expected one of {', '.join(UNITS)}"
-        )
+        raise ZoneError(f"quantity {quantity!r} cannot be pooled; expected one of {', '.join(UNITS)}")
     if not isinstance(sites, Mapping) or len(sites) < 2:
-        raise ZoneError(
-            f"expected two or more sites by name; got {sites!r:.80}; add sites"
-        )
-    rows = [
-        (name, *_read_site(name, site, quantity, speed)) for name, site in sites.items()
-    ]
+        raise ZoneError(f"expected two or more sites by name; got {sites!r:.80}; add sites")
+    rows = [(name, *_read_site(name, site, quantity, speed)) for name, site in sites.items()]
     table = pd.DataFrame(rows, columns=["site", "value", "low", "high"])
     numbers = table[["value", "low", "high"]].to_numpy()
     y, low, high = (np.log(numbers) if quantity in POSITIVE else numbers).T
@@ -129,49 +121,31 @@ def pool(
     reach, new = t.ppf(0.975, [k - 1, k - 2]) * [error, np.hypot(tau, error)]
     ends = np.array([mean, mean - reach, mean + reach, mean - new, mean + new])
     found = map(float, np.exp(ends) if quantity in POSITIVE else ends)
-    return Pooled(
-        quantity, table.assign(weight=weights / weights.sum()), k, tau, *found
-    )
+    return Pooled(quantity, table.assign(weight=weights / weights.sum()), k, tau, *found)
 
 
-def _read_site(
-    name: str, site: Any, quantity: str, speed: float
-) -> tuple[float, float, float]:
+def _read_site(name: str, site: Any, quantity: str, speed: float) -> tuple[float, float, float]:
     """Value and interval of a quantity of a `site`."""
     what, values = f"site {name!r}: ", site
     if isinstance(site, SocialZone):
         what += f"{quantity} at {speed:g} m/s: "
         if speed not in site.ellipses:
-            raise ZoneError(
-                f"{what}the zone was fitted at {list(site.ellipses)} m/s; choose one of these"
-            )
+            raise ZoneError(f"{what}the zone was fitted at {list(site.ellipses)} m/s; choose one of these")
         column = "area" if quantity == "radius" else quantity
-        row = (
-            site.table()
-            .set_index("speed")
-            .loc[speed, [column, f"{column}_low", f"{column}_high"]]
-        )
+        row = site.table().set_index("speed").loc[speed, [column, f"{column}_low", f"{column}_high"]]
         values = row.to_numpy(float)
         if np.isnan(values).any():
-            raise ZoneError(
-                f"{what}the zone has no interval; fit it with n_resamples=200, or to more data"
-            )
+            raise ZoneError(f"{what}the zone has no interval; fit it with n_resamples=200, or to more data")
         if quantity == "radius":
             values = np.sign(values) * np.sqrt(np.abs(values) / np.pi)
     try:
         value, low, high = map(float, values)
     except (TypeError, ValueError) as error:
-        raise ZoneError(
-            f"{what}expected a SocialZone, or value, low, high; got {site!r:.80}"
-        ) from error
-    numbers, lowest = (
-        ("numbers > 0", 0.0) if quantity in POSITIVE else ("numbers", -np.inf)
-    )
+        raise ZoneError(f"{what}expected a SocialZone, or value, low, high; got {site!r:.80}") from error
+    numbers, lowest = ("numbers > 0", 0.0) if quantity in POSITIVE else ("numbers", -np.inf)
     if not (lowest < low <= value <= high < np.inf and low < high):
         got = f"got {value:g}, {low:g}, {high:g}; leave the site out"
-        raise ZoneError(
-            f"{what}expected {numbers}, low < high, and the value between them; {got}"
-        )
+        raise ZoneError(f"{what}expected {numbers}, low < high, and the value between them; {got}")
     return value, low, high
 
 
@@ -183,8 +157,4 @@ def _estimate_tau(y: np.ndarray, variances: np.ndarray) -> float:
         weights = 1 / (variances + squared)
         return float(weights @ (y - np.average(y, weights=weights)) ** 2) - (len(y) - 1)
 
-    return (
-        float(np.sqrt(brentq(excess, 0.0, len(y) * np.ptp(y) ** 2)))
-        if excess(0.0) > 0
-        else 0.0
-    )
+    return float(np.sqrt(brentq(excess, 0.0, len(y) * np.ptp(y) ** 2))) if excess(0.0) > 0 else 0.0

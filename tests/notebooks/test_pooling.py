@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from scipy import stats
+from studies.pooling import pool
 
 import szlib
 
@@ -44,7 +45,7 @@ def test_bcg_trials_give_the_published_numbers() -> None:
         np.log(a / (a + b) / (c / (c + d))),
         1 / a - 1 / (a + b) + 1 / c - 1 / (c + d),
     )
-    pooled = szlib.pool(triples(ratio, np.sqrt(variance)), quantity="center_x")
+    pooled = pool(triples(ratio, np.sqrt(variance)), quantity="center_x")
     assert pooled.tau**2 == pytest.approx(0.318, abs=5e-4)
     assert pooled.mean == pytest.approx(-0.715, abs=5e-4)
     standard = 1 / np.sqrt((1 / (variance + pooled.tau**2)).sum())
@@ -75,7 +76,7 @@ def restricted_likelihood(
 
 def test_equal_errors_give_the_interval_of_the_ordinary_t_test() -> None:
     y = np.array([0.3, 0.9, 0.1, 0.5, 1.2])
-    pooled = szlib.pool(triples(y, np.full(5, 0.2)), quantity="center_y")
+    pooled = pool(triples(y, np.full(5, 0.2)), quantity="center_y")
     expected = stats.ttest_1samp(y, 0).confidence_interval(0.95)
     assert (pooled.low, pooled.high) == pytest.approx(tuple(expected))
     assert pooled.tau**2 == pytest.approx(y.var(ddof=1) - 0.2**2)
@@ -85,9 +86,7 @@ def test_equal_errors_give_the_interval_of_the_ordinary_t_test() -> None:
 
 
 def test_sites_that_differ_less_than_by_chance_have_one_value() -> None:
-    pooled = szlib.pool(
-        {"a": (1.0, 0.5, 1.5), "b": (1.01, 0.5, 1.5), "c": (0.99, 0.9, 1.1)}
-    )
+    pooled = pool({"a": (1.0, 0.5, 1.5), "b": (1.01, 0.5, 1.5), "c": (0.99, 0.9, 1.1)})
     assert pooled.tau == 0
     assert pooled.table["weight"].iloc[2] > 0.8
 
@@ -99,7 +98,7 @@ def test_intervals_hold_mean_and_new_site(k: int, tau: float) -> None:
         errors = np.exp(rng.normal(np.log(0.1), 0.4, k))
         y = rng.normal(0, tau, k) + rng.normal(0, errors)
         pooled, new = (
-            szlib.pool(triples(y, errors), quantity="center_x"),
+            pool(triples(y, errors), quantity="center_x"),
             rng.normal(0, tau),
         )
         held += [pooled.low < 0 < pooled.high, pooled.new_low < new < pooled.new_high]
@@ -110,15 +109,15 @@ def test_intervals_hold_mean_and_new_site(k: int, tau: float) -> None:
 
 
 def test_order_of_the_sites_changes_nothing() -> None:
-    again = szlib.pool(dict(reversed(SITES.items())))
-    assert numbers(again) == pytest.approx(numbers(szlib.pool(SITES)), rel=1e-9)
+    again = pool(dict(reversed(SITES.items())))
+    assert numbers(again) == pytest.approx(numbers(pool(SITES)), rel=1e-9)
 
 
 @pytest.mark.parametrize("quantity", ["radius", "a", "b", "area"])
 def test_positive_quantities_follow_their_unit(quantity: str) -> None:
-    pooled, scale = szlib.pool(SITES, quantity=quantity), 100.0
+    pooled, scale = pool(SITES, quantity=quantity), 100.0
     scaled = {name: tuple(scale * v for v in site) for name, site in SITES.items()}
-    again = szlib.pool(scaled, quantity=quantity)
+    again = pool(scaled, quantity=quantity)
     assert numbers(again) == pytest.approx([scale * v for v in numbers(pooled)])
     assert again.tau == pytest.approx(pooled.tau)
     assert again.new_low > 0
@@ -126,8 +125,8 @@ def test_positive_quantities_follow_their_unit(quantity: str) -> None:
 
 def test_offsets_of_the_centre_move_with_their_origin() -> None:
     moved = {name: tuple(v - 1 for v in site) for name, site in SITES.items()}
-    expected = [v - 1 for v in numbers(szlib.pool(SITES, quantity="center_x"))]
-    assert numbers(szlib.pool(moved, quantity="center_x")) == pytest.approx(expected)
+    expected = [v - 1 for v in numbers(pool(SITES, quantity="center_x"))]
+    assert numbers(pool(moved, quantity="center_x")) == pytest.approx(expected)
 
 
 # --- zones -------------------------------------------------------------------------------------------
@@ -160,10 +159,10 @@ def test_zones_are_pooled_by_their_ellipse_and_its_interval() -> None:
                 .astype(float)
             )
             given[name] = tuple(np.sqrt(row / np.pi) if quantity == "radius" else row)
-        expected = szlib.pool(given, quantity=quantity)
-        assert numbers(szlib.pool(zones, quantity=quantity)) == numbers(expected)
+        expected = pool(given, quantity=quantity)
+        assert numbers(pool(zones, quantity=quantity)) == numbers(expected)
     a, b = zones["first"].ellipse(1.1).semi_axes
-    assert szlib.pool(zones).table["value"].iloc[0] == pytest.approx(np.sqrt(a * b))
+    assert pool(zones).table["value"].iloc[0] == pytest.approx(np.sqrt(a * b))
 
 
 def test_zones_without_an_interval_or_at_other_speeds_are_refused() -> None:
@@ -172,23 +171,23 @@ def test_zones_without_an_interval_or_at_other_speeds_are_refused() -> None:
         szlib.ZoneError,
         match=r"site 'bare': radius at 1.1 m/s: the zone has no interval",
     ):
-        szlib.pool(zones)
+        pool(zones)
     with pytest.raises(szlib.ZoneError, match=r"site 'hall': .* fitted at \[1.1\] m/s"):
-        szlib.pool(zones, speed=0.9)
+        pool(zones, speed=0.9)
 
 
 # --- few sites, wrong sites --------------------------------------------------------------------------
 
 
 def test_two_sites_give_no_interval_of_a_new_one_and_say_why() -> None:
-    pooled = szlib.pool({name: SITES[name] for name in ("hall", "mall")})
+    pooled = pool({name: SITES[name] for name in ("hall", "mall")})
     assert np.isnan([pooled.new_low, pooled.new_high]).all()
     assert np.isfinite([pooled.mean, pooled.low, pooled.high]).all()
     assert "no interval of a new site, which needs 3 sites" in str(pooled)
 
 
 def test_it_prints_one_line_with_units() -> None:
-    text = str(szlib.pool(SITES))
+    text = str(pool(SITES))
     assert text.startswith("radius over 4 sites: mean 0.89 m (its 95 % interval ")
     assert "\n" not in text and "prediction interval" in text
 
@@ -210,15 +209,15 @@ def test_site_without_an_interval_around_its_value_is_named(
     site: Any, said: str
 ) -> None:
     with pytest.raises(szlib.ZoneError, match="site 'wrong'") as raised:
-        szlib.pool({**SITES, "wrong": site})
+        pool({**SITES, "wrong": site})
     assert said in str(raised.value)
 
 
 def test_one_site_and_an_unknown_quantity_are_refused() -> None:
     for sites in ({}, {"hall": SITES["hall"]}, [SITES["hall"]] * 2):
         with pytest.raises(szlib.ZoneError, match="two or more sites by name"):
-            szlib.pool(sites)  # type: ignore[arg-type]
+            pool(sites)  # type: ignore[arg-type]
     with pytest.raises(
         szlib.ZoneError, match="'growth' cannot be pooled; expected one of radius"
     ):
-        szlib.pool(SITES, quantity="growth")
+        pool(SITES, quantity="growth")

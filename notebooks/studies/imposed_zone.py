@@ -19,16 +19,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..core.checks import Array, check_columns, require
-from ..core.errors import ZoneError
-from ..encounters.finding import find_encounters
-from ..encounters.kinds import WALKING
-from ..encounters.samples import SAMPLE_COLUMNS
-from ..encounters.settings import EncounterSettings
-from ..encounters.time_shift import time_shifted
-from ..tracks import funnels
-from .ellipses import Ellipse
-from .outliers import pair_numbers
+from szlib.core.checks import Array, check_columns, require
+from szlib.core.errors import ZoneError
+from szlib.encounters.finding import find_encounters
+from szlib.encounters.kinds import WALKING
+from szlib.encounters.samples import SAMPLE_COLUMNS
+from szlib.encounters.settings import EncounterSettings
+from szlib.encounters.time_shift import time_shifted
+from szlib.tracks import funnels
+from szlib.zones.ellipses import Ellipse
+from szlib.zones.outliers import pair_numbers
 
 
 def impose_zone(
@@ -67,17 +67,16 @@ def impose_zone(
     Examples
     --------
     >>> import szlib
+    >>> from studies.imposed_zone import impose_zone
     >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=200))
     >>> tracks, zone = szlib.read_tracks(plaza), szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
-    >>> samples = szlib.impose_zone(tracks, zone, minutes=(1, 3), min_distance=0.5)
+    >>> samples = impose_zone(tracks, zone, minutes=(1, 3), min_distance=0.5)
     >>> bool(samples["distance"].min() > 0.6)
     True
     """
     shifted = time_shifted(tracks, seed=seed, minutes=minutes)
     samples = find_encounters(shifted, settings=settings, kinds=kinds, **parameters)
-    return PairedSamples.from_samples(samples).impose(
-        ellipse, careless=careless, seed=seed
-    )
+    return PairedSamples.from_samples(samples).impose(ellipse, careless=careless, seed=seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,23 +101,18 @@ class PairedSamples:
         if len(samples):
             check_columns(samples, SAMPLE_COLUMNS)
         views = [
-            samples["distance"]
-            * np.exp(1j * samples[angle].where(samples[speed] >= WALKING))
+            samples["distance"] * np.exp(1j * samples[angle].where(samples[speed] >= WALKING))
             for angle, speed in (
                 ("los_angle", "speed"),
                 ("other_los_angle", "other_speed"),
             )
         ]
-        points = np.array(
-            [np.column_stack([np.real(view), np.imag(view)]) for view in views]
-        )
+        points = np.array([np.column_stack([np.real(view), np.imag(view)]) for view in views])
         return cls(samples, pair_numbers(samples), points)
 
     def pairs_inside(self, ellipse: Ellipse) -> NDArray[np.bool_]:
         """Whether, at any sample of each pair, one person is inside the other's `ellipse`; (pairs,)."""
-        require(
-            isinstance(ellipse, Ellipse), "ellipse", ellipse, "an Ellipse", ZoneError
-        )
+        require(isinstance(ellipse, Ellipse), "ellipse", ellipse, "an Ellipse", ZoneError)
         inside = np.zeros(int(self.pair.max(initial=-1)) + 1, bool)
         inside[self.pair[(ellipse.level(self.points) < 1).any(axis=0)]] = True
         return inside
