@@ -12,8 +12,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from szlib.workbook.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from szlib.workbook.figures.style import add_legend_below, add_shared_legend, get_axes
+from szlib.workbook.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    add_legend_below,
+    add_shared_legend,
+    get_axes,
+)
 from szlib.zones.pooling import POSITIVE, UNITS, Pooled
 
 # Colour and hatching of each kind of safety violation.
