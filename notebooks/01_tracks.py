@@ -53,6 +53,7 @@ import warnings
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from studies import real_day
 
@@ -73,7 +74,7 @@ inside = square.contains(people["x"], people["y"])
 speed = np.hypot(people["vx"], people["vy"])
 walking = speed[speed > 0.4]
 fig, (ax, right) = plt.subplots(1, 2, figsize=(10.5, 3.1), layout="constrained", width_ratios=(1.6, 1))
-figures.plot_map(people, square, ax=ax)
+plots.plot_map(people, square, ax=ax)
 ax.set_title(f"{inside.mean():.0%} of the time people are in the area (red)")
 ax.get_legend().remove()
 right.hist(

@@ -60,6 +60,7 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 from IPython.display import Markdown
 from matplotlib.patches import Circle
 
@@ -468,7 +469,7 @@ record.check("d by hand is the library's d", off < 1e-12, f"largest difference {
 
 # %% jupyter={"source_hidden": true}
 # Figure
-ax = figures.plot_distance(zone)
+ax = plots.plot_distance(zone)
 ax.set_title("The robot's centre must stay outside the red line")
 record.figure(ax.figure, "ellipse")
 
@@ -488,7 +489,7 @@ record.figure(ax.figure, "ellipse")
 # %% jupyter={"source_hidden": true}
 # Figure
 wall = (np.array([-1.0, 0.0]), np.array([1.0, 0.0]))
-ax = figures.plot_distance(wall)
+ax = plots.plot_distance(wall)
 ax.set_title("Around a wall the red line closes behind both ends")
 record.figure(ax.figure, "segment")
 

@@ -56,6 +56,7 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from laboratory import draw_step, show_sliders
 from studies import gamma_table, paper_claims, scenario_runs
@@ -118,10 +119,10 @@ asked = {side: drive(scenario, zone, replace(settings, pass_side=side)) for side
 sides = {name: run.metrics()["passing_side"] for name, run in tilted.items()}
 both_ways = {sides["as fitted"], sides["mirrored"]} == {"left", "right"}
 fig, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
-figures.plot_robot_paths(tilted, ax=left)
+plots.plot_robot_paths(tilted, ax=left)
 choice = "chooses" if both_ways else "does not choose"
 left.set_title(f"The paper's: a tilt of {abs(np.degrees(tilt)):.1f}° {choice} the side")
-figures.plot_robot_paths({f"asked for {side}": run for side, run in asked.items()}, ax=right)
+plots.plot_robot_paths({f"asked for {side}": run for side, run in asked.items()}, ax=right)
 obeyed = all(run.metrics()["passing_side"] == side for side, run in asked.items())
 right.set_title("Ours: pass_side decides" if obeyed else "Ours: pass_side does not always decide")
 for ax in (left, right):

@@ -92,7 +92,7 @@ within = {name: paper.dt * each["violations"] for name, each in found.items()}
 fig, panels = plt.subplots(1, 2, figsize=(10, 2.9), layout="constrained", sharex=True, sharey=True)
 reach = np.concatenate([log.states[:, 1] for log in streams.values()])
 for ax, (name, log) in zip(panels, streams.items(), strict=True):
-    figures.plot_crowd(log, ax=ax).set(xlim=(-1, 12), ylim=(reach.min() - 2, reach.max() + 1))
+    plots.plot_crowd(log, ax=ax).set(xlim=(-1, 12), ylim=(reach.min() - 2, reach.max() + 1))
     arrives = f"goal in {found[name]['time_to_goal']:.1f} s" if log.success else "no goal in 40 s"
     ax.set_title(f"{name}: {arrives}, " + (f"h < 0 for {within[name]:.1f} s" if within[name] else "h >= 0"))
 fig.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
@@ -195,7 +195,7 @@ record.figure(fig, "map")
 dead_end = drive_both((10.0, 0.0), walls=walls)
 stuck, there = (dead_end[name] for name in ("paper", "among people"))
 fig, ax = plt.subplots(figsize=(9, 4.2), layout="constrained")
-figures.plot_robot_paths(dead_end, ax=ax)
+plots.plot_robot_paths(dead_end, ax=ax)
 figures.add_legend_below(ax, gap=0.15, ncols=5)
 arrives = f"arrives in {there.metrics()['time_to_goal']:.1f} s" if there.success else "does not arrive"
 ends = (
@@ -378,7 +378,7 @@ record.check(
 )
 doors = drive_both((8.0, 0.0), near_door, two_doors)
 fig, ax = plt.subplots(figsize=(6, 4.8), layout="constrained")
-figures.plot_robot_paths(doors, ax=ax).get_legend().remove()
+plots.plot_robot_paths(doors, ax=ax).get_legend().remove()
 ax.plot(4.0, 0.0, marker=(3, 0, 90), color=figures.RED, markersize=7)
 ax.set(xlim=(-1, 10), ylim=(-2.5, 8.5))
 figures.add_legend_below(ax, ncols=4)
@@ -436,7 +436,7 @@ others = {cheap: replace(among, zone_price=40.0)}
 fronts = drive_both((8.0, 0.0), front, title="Five people side by side", others=others)
 fig, panels = plt.subplots(3, 1, figsize=(10, 9.2), layout="constrained", sharex=True, sharey=True)
 for ax, (name, log) in zip(panels, fronts.items(), strict=True):
-    figures.plot_crowd(log, ax=ax).set(xlim=(-16, 10), ylim=(-5.5, 5.5))
+    plots.plot_crowd(log, ax=ax).set(xlim=(-16, 10), ylim=(-5.5, 5.5))
     arrived, back = log.metrics()["time_to_goal"], log.states[:, 0].min()
     ax.set_title(
         f"{name}: " + (f"there in {arrived:.1f} s" if log.success else f"backs away to x = {back:.0f} m")
@@ -577,7 +577,7 @@ group = tuple(
 )
 talking = drive_both((8.0, 0.0), group)
 fig, ax = plt.subplots(figsize=(8, 3.6), layout="constrained")
-figures.plot_robot_paths(talking, ax=ax).get_legend().remove()
+plots.plot_robot_paths(talking, ax=ax).get_legend().remove()
 for person in group:
     ax.plot(*person.position, marker=(3, 0, np.degrees(person.heading) - 90), color=figures.RED, markersize=7)
 left = [np.hypot(*(log.states[-1, :2] - (8, 0))) for log in talking.values()]

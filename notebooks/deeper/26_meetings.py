@@ -48,9 +48,10 @@ n_jobs = 1
 # Imports, and the record of the run
 import sys
 
-sys.path.append("..")  # for `studies`
+sys.path.append("..")  # for `plots` and `studies`
 import matplotlib.pyplot as plt
 import pandas as pd
+import plots
 from IPython.display import display
 from matplotlib.patches import Circle
 from studies import meetings
@@ -118,7 +119,7 @@ for name, meeting in szlib.MEETINGS.items():
 # Figure
 fig, grid = plt.subplots(4, 3, figsize=(12, 11), layout="constrained")
 for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
-    figures.plot_crowd(log, ax=ax)
+    plots.plot_crowd(log, ax=ax)
     ax.set_title(f"{name}: {log.time[-1]:.0f} s, least h {log.h.min():.2f} m", fontsize=11)
     ax.set(xlim=(-7.5, 7.5), ylim=(-5, 6), xticks=(-5, 0, 5), xlabel="x [m]" if ax in grid[-1] else "")
     ax.set_ylabel("y [m]" if ax in grid[:, 0] else "")

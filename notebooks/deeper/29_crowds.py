@@ -103,7 +103,7 @@ for name in models:
 fig, grid = plt.subplots(1, max(1, len(logs)), figsize=(10, 3.3), layout="constrained", squeeze=False)
 top = max([5.0, *(log.states[:, 1].max() + 1 for log in logs.values())])
 for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
-    figures.plot_crowd(log, ax=ax).set(xlim=(-7.8, 7.8), ylim=(-5, top))
+    plots.plot_crowd(log, ax=ax).set(xlim=(-7.8, 7.8), ylim=(-5, top))
     ax.set_title(f"{name}: {log.time[-1]:.1f} s, least h {log.h.min():.2f} m")
 fig.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside right center")
 record.figure(fig, "crossing")
@@ -219,7 +219,7 @@ table.drop(index="unexplained").round(2)
 # Figure
 busiest = int(np.argmin([compute_replay_metrics(log)["nearest"] for log in runs]))
 fig, ax = plt.subplots(figsize=(7, 4.5), layout="constrained")
-figures.plot_crowd(runs[busiest], walked=made[busiest].walker.states[:, :2], ax=ax)
+plots.plot_crowd(runs[busiest], walked=made[busiest].walker.states[:, :2], ax=ax)
 nearest = compute_replay_metrics(runs[busiest])["nearest"]
 ax.set_title(f"The closest of {len(made)} ways: {nearest:.2f} m from centre to centre")
 ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)

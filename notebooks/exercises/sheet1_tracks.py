@@ -90,7 +90,11 @@ judges.check("line_of_sight", line_of_sight)
 # that space: booleans, shape (n,).
 
 # %%
-ax = figures.plot_attentional_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE)
+corners = szlib.AttentionalSpace().corners
+ax = figures.get_axes(None, size=(4.5, 3.6))
+ax.fill(*corners.T, color=figures.BLUE, alpha=0.3)
+ax.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=14)
+figures.label_metres(ax, "The attentional space", person=True)
 plt.show()
 
 

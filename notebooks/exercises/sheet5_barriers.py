@@ -42,7 +42,13 @@ from szlib.workbook import figures
 # paper's distance (eq. 7): half the sum of the distances to the two foci, less a.
 
 # %%
-ax = figures.plot_distance(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+grid = np.stack(np.meshgrid(np.linspace(-2, 2, 201), np.linspace(-2, 2, 201)), axis=-1)
+ax = figures.get_axes(None, size=(5.5, 4.5))
+lines = ax.contour(*np.moveaxis(grid, -1, 0), szlib.ellipse_distance(grid, zone), levels=7)
+ax.clabel(lines, fontsize=7)
+ax.plot(*zone.curve().T, color=figures.BLACK, linewidth=2)
+figures.label_metres(ax, "Distance to the zone [m]", person=True)
 plt.show()
 
 

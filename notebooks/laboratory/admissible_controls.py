@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -201,6 +202,6 @@ def draw_step(step: szlib.Step) -> Figure:
     2
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
-    figures.plot_step(step, ax=left)
+    plots.plot_step(step, ax=left)
     plot_admissible_controls(step, ax=right)
     return figure

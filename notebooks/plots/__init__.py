@@ -1,9 +1,10 @@
-"""Figures that one or two notebooks use; the figures that all share are in `szlib.workbook.figures`.
+"""Figures of the notebooks; those that szlib itself draws are in `szlib.workbook.figures`.
 
 comparisons  many runs or fits: sweeps, strategies, intervals, claims, sites (notebooks 06, 21, 23, 25, 27, 29)
-control      the error of a distance, and the ways of a step (notebooks 22, 12)
-encounters   paths, an encounter in motion, and where the other person is (notebook 02)
-tracks       speeds, and the rows that each stage keeps (notebook 24)
+control      a distance, a step, and its ways (notebooks 07, 12, the laboratory)
+encounters   paths, an encounter in motion, where the other person is (notebook 02)
+simulation   paths of several runs, crowds (notebooks 09, 12, 26, 29)
+tracks       where people walked, speeds, and the rows that each stage keeps (notebooks 01, 24)
 zones        outliers, the hull (notebooks 03, 04)
 """
 
@@ -17,12 +18,13 @@ from .comparisons import (
     plot_sweep,
     plot_zone_sizes,
 )
-from .control import plot_ways
+from .control import plot_distance, plot_step, plot_ways
 from .encounters import (
     animate_encounter,
     plot_distance_by_direction,
     plot_encounter_paths,
     plot_relative_positions,
 )
-from .tracks import plot_funnel, plot_speed_histogram
+from .simulation import plot_crowd, plot_robot_paths
+from .tracks import plot_funnel, plot_map, plot_speed_histogram
 from .zones import plot_hull, plot_outliers

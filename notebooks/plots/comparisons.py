@@ -13,8 +13,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from studies.pooling import POSITIVE, UNITS, Pooled
 
-from szlib.workbook.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from szlib.workbook.figures.style import add_legend_below, add_shared_legend, get_axes
+from szlib.workbook.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    add_legend_below,
+    add_shared_legend,
+    get_axes,
+)
 
 # Colour and hatching of each kind of safety violation.
 _BARS = {

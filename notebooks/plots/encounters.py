@@ -15,8 +15,18 @@ from matplotlib.patches import Circle
 from PIL import Image
 
 from szlib.core.errors import DataError
-from szlib.workbook.figures.palette import BLACK, BLUE, GREY, ORANGE, RED, SEQUENCE
-from szlib.workbook.figures.style import add_legend_below, draw_person, get_axes, label_metres
+from szlib.workbook.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    RED,
+    SEQUENCE,
+    add_legend_below,
+    draw_person,
+    get_axes,
+    label_metres,
+)
 from szlib.zones.ellipses import Ellipse
 
 _HALF_TICK = 0.05  # half a step of the clock of tracks [s]

@@ -15,8 +15,16 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import ConvexHull
 
 from szlib.core.errors import ZoneError
-from szlib.workbook.figures.palette import BLACK, BLUE, GREY, RED, pick_colours
-from szlib.workbook.figures.style import add_legend_below, get_axes, label_metres
+from szlib.workbook.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    RED,
+    add_legend_below,
+    get_axes,
+    label_metres,
+    pick_colours,
+)
 from szlib.zones.hulls import HullZone
 from szlib.zones.social_zone import SocialZone
 

@@ -53,8 +53,10 @@ from szlib.workbook import figures
 zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 controller = szlib.MPCCBF(zone, settings=szlib.MPCSettings(gamma=0.15, a_max=0.5))
 log = szlib.simulate(szlib.SCENARIOS["passing"], controller)
-ax = figures.plot_barriers(log)
-ax.set_ylabel("h [m], logarithmic\nabove 0.5 m")
+ax = log.table.plot("t", "h_person_0", color=figures.RED, legend=False, figsize=(8, 2.5))
+ax.axhline(0, color=figures.GREY, linewidth=1)
+ax.set_yscale("symlog", linthresh=0.5)
+ax.set(xlabel="time [s]", ylabel="h [m], logarithmic\nabove 0.5 m")
 ax.set_title(f"gamma = 0.15, a_max = 0.5: {log.metrics()['infeasible_steps']} infeasible steps")
 plt.show()
 

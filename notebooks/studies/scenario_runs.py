@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pandas.io.formats.style import Styler
@@ -122,7 +123,7 @@ def draw_paths_and_speeds(runs: ScenarioRuns, title: str) -> Figure:
     """Draw the paths of both robots beside their speeds over time; the `title` says the result."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained", width_ratios=(1.5, 1))
     # plot_robot_paths draws the first run as STYLES has ours, and the second as the paper's.
-    figures.plot_robot_paths({OURS: runs.ours, PAPERS: runs.paper}, ax=left)
+    plots.plot_robot_paths({OURS: runs.ours, PAPERS: runs.paper}, ax=left)
     left.get_legend().remove()
     figures.add_shared_legend((left,))
     left.set_title("Paths, and the zone at the start")

@@ -163,7 +163,7 @@ def walked_area(
     or narrow and a small part of the place (small rooms, corridors, oblique views), the area is the outline
     of the place where people were seen.  It may hold spots where nobody walked (furniture, pillars), of
     which a DataWarning states the share if many people walked: look at the map
-    (`szlib.workbook.figures.plot_map`).
+    (`plots.plot_map`, beside the notebooks).
 
     The area never reaches outside where people can be seen: where people were seen, and in gaps between
     them that are narrower than 4 m.

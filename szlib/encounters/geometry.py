@@ -35,6 +35,8 @@ class Square:
     96
     >>> square.grown(-1)
     Square(x=(1, 11), y=(1, 7))
+    >>> szlib.ATC_SQUARE.area
+    198.0
     """
 
     x: tuple[float, float]

@@ -57,6 +57,15 @@ class LoopSettings:
     settings : settings of the measurements (dt, r_robot, eps, zone_speed); None: the controller's.
     max_time : time limit [s]; None: the scenario's duration.
     until_arrival : False: run to the time limit, so that a robot at its goal may still have to make room.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.simulation.closed_loop import drive
+    >>> controller = szlib.MPCCBF(szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7)))
+    >>> run = drive(szlib.SCENARIOS["passing"], controller, szlib.LoopSettings(max_time=1.0))
+    >>> run.metrics()["infeasible_steps"]
+    0
     """
 
     behaviour: CrowdModel = UNAFFECTED

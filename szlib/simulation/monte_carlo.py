@@ -64,6 +64,13 @@ class RolloutSetup:
     controller : makes the controller for a scenario with these settings.
     zone_transform : makes the zone that the robot keeps out of from each person's own zone.
     measure : further columns from each run.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> setup = szlib.RolloutSetup(behaviour=szlib.simulation.Behaviour(pace=0.8))
+    >>> setup.run(3).metrics()["success"]
+    True
     """
 
     settings: MPCSettings = field(default_factory=MPCSettings)

@@ -158,7 +158,7 @@ def _read_notebook(
 
 
 def sanitize(html: str) -> str:
-    """The same HTML with harmless tags and attributes only; pictures of the notebooks are embedded.
+    """The same `html` with harmless tags and attributes only; pictures of the notebooks are embedded.
 
     Nothing in it can run, or ask another server.
     """

@@ -416,8 +416,7 @@ def test_a_step_names_a_half_plane():
 def test_an_obstacle_goes_through_run_log_and_figures(obstacle, kind, tmp_path: File):
     """A half-plane, and a kind that szlib does not know: only the class is written."""
     import matplotlib.pyplot as plt
-
-    from szlib.workbook import figures
+    import plots
 
     walls, person = [((-6.0, 2.5), (6.0, 2.5))], szlib.Person((5.0, 0.8), (-0.6, 0.1))
     scenario = szlib.Scenario(
@@ -445,10 +444,9 @@ def test_an_obstacle_goes_through_run_log_and_figures(obstacle, kind, tmp_path: 
 
     ax = log.plot()
     assert obstacle.kind in [text.get_text() for text in ax.get_legend().get_texts()]
-    figures.plot_barriers(log)
     step = controller.step(log.states[-1] if kind != "two wheels" else [0, 0.9, 0], (3.0, 0.2))  # fmt: skip
     point = getattr(step, "point", step)
-    figures.plot_step(point)
+    plots.plot_step(point)
     plot_admissible_controls(point)
     plt.close("all")
     assert step.verify().ok and point.scene.name(1).startswith(f"{obstacle.kind} 0 (")

@@ -75,9 +75,9 @@ def test_a_half_plane_is_a_line_across_the_picture_and_hatched_beyond(platform, 
     step = controller.step(*log.controller_inputs(3.5))
     ax = {
         "scenario": lambda: figures.plot_scenario(log),
-        "robot paths": lambda: figures.plot_robot_paths({"a": log}),
-        "crowd": lambda: figures.plot_crowd(log),
-        "step": lambda: figures.plot_step(step),
+        "robot paths": lambda: plots.plot_robot_paths({"a": log}),
+        "crowd": lambda: plots.plot_crowd(log),
+        "step": lambda: plots.plot_step(step),
     }[name]()
     assert in_metres(ax)
     ends, hatched = along_edge(ax)
@@ -95,20 +95,6 @@ def test_the_player_draws_a_half_plane_as_one_line(platform):
     assert wall == [-5.0, 3.0, 5.0, 3.0]
     x, y = np.reshape(edge, (2, 2)).T
     assert EDGE.distance(x, y, 0.0, *EDGE.numbers) == pytest.approx(0.0, abs=2e-3)
-
-
-def test_barriers_of_people_who_come_later_are_theirs_and_not_of_a_wall():
-    scenario = szlib.Scenario("hall", (-4, 0, 0, 0), (4, 0))
-    person = szlib.Person((0.0, 3.0), heading=0.0)
-    log = szlib.simulate(
-        scenario,
-        szlib.MPCCBF(ZONE),
-        crowd=lambda t, _: [person if t > 1 else None],
-        max_time=2.0,
-    )
-    ax = figures.plot_barriers(log)
-    assert [line.get_label() for line in ax.lines[:-1]] == ["person"]
-    assert ax.get_ylim()[1] > np.nanmax(log.h)
 
 
 @pytest.fixture(scope="module")
@@ -155,10 +141,7 @@ def paths():
 
 
 MAPS = {
-    "map": lambda f: figures.plot_map(f("tracks"), szlib.ATC_SQUARE),
-    "space": lambda f: figures.plot_attentional_space(
-        szlib.AttentionalSpace(), szlib.ATC_SQUARE, pose=(-13, 0, 1.0)
-    ),
+    "map": lambda f: plots.plot_map(f("tracks"), szlib.ATC_SQUARE),
     "paths": lambda f: plots.plot_encounter_paths(paths(), n_shown=3),
     "los": lambda f: plots.plot_relative_positions(f("samples")),
     "outliers": lambda f: plots.plot_outliers(
@@ -166,13 +149,11 @@ MAPS = {
     ),
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
     "zones": lambda f: figures.plot_zones(f("zone").ellipses),
-    "ellipse": lambda f: figures.plot_distance(ZONE),
-    "segment": lambda f: figures.plot_distance(
-        (np.array([-1.0, 0]), np.array([1.0, 0]))
-    ),
+    "ellipse": lambda f: plots.plot_distance(ZONE),
+    "segment": lambda f: plots.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
     "scenario": lambda f: figures.plot_scenario(f("log")),
-    "step": lambda f: figures.plot_step(f("step")),
-    "robot paths": lambda f: figures.plot_robot_paths({"a": f("log"), "b": f("log")}),
+    "step": lambda f: plots.plot_step(f("step")),
+    "robot paths": lambda f: plots.plot_robot_paths({"a": f("log"), "b": f("log")}),
 }
 
 
@@ -315,14 +296,6 @@ def test_a_quantile_zone_shows_its_radii_and_has_no_hull(samples):
     assert labels == ["radius by direction (quantile)", "fitted ellipse"]
     with pytest.raises(szlib.ZoneError, match="'quantile' has no hull to draw"):
         plots.plot_hull(zone)
-
-
-def test_barriers_show_the_whole_range(log):
-    h = figures.plot_barriers(log)
-    assert "[m]" in h.get_ylabel()
-    assert len(h.lines) == 3, "the person, the nearest of two walls, zero"
-    assert np.array_equal(h.lines[1].get_ydata(), log.h[:, 1:].min(axis=1))
-    assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()
 
 
 def test_the_limits_hold_everything_that_is_drawn(log):
@@ -506,7 +479,7 @@ def test_an_interval_grid_has_a_panel_for_each_metric_and_one_legend():
 
 
 def test_a_crowd_is_drawn_at_the_nearest_approach(log):
-    ax = figures.plot_crowd(log)
+    ax = plots.plot_crowd(log)
     robot = ax.patches[-1]
     row = int(np.hypot(log.relative[:, 0, 0], log.relative[:, 0, 1]).argmin())
     assert robot.center == pytest.approx(tuple(log.states[row, :2]))

@@ -1,35 +1,26 @@
-"""Every figure of the workbook.
+"""Figures that szlib itself draws; those of notebooks are in the package `plots` beside them.
 
-`plot_*` draws on the axes it is given, or on new ones, and returns them.  `draw_*` makes a whole figure.
+`plot_*` draws on the axes it is given, or on new ones, and returns them.
 
-palette      colours
-style        sizes, labels in metres, people, legends
-tracks       where people walked, how fast, and how many rows each stage keeps
-encounters   the attentional space, paths, and where the other person is
-zones        outliers, the hull, zones by speed, the pair correlation
-control      distances and barriers, the scene of a step, and its ways
-simulation   runs of the robot, and their animations
+style        colours, sizes, labels in metres, people, obstacles, legends
+zones        zones by speed, with their intervals
+simulation   a run over time, and its animation
 movies       runs as players in a browser
 """
 
-from .control import (
-    plot_distance,
-    plot_step,
+from .simulation import animate, plot_scenario
+from .style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    add_legend_below,
+    add_shared_legend,
+    alt_text,
+    get_axes,
+    label_metres,
+    pick_colours,
 )
-from .encounters import (
-    plot_attentional_space,
-)
-from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED, pick_colours
-from .simulation import (
-    animate,
-    plot_barriers,
-    plot_crowd,
-    plot_robot_paths,
-    plot_scenario,
-)
-from .style import add_legend_below, add_shared_legend, alt_text, get_axes, label_metres
-from .tracks import plot_map
-from .zones import (
-    plot_zone,
-    plot_zones,
-)
+from .zones import plot_zone, plot_zones

@@ -19,8 +19,7 @@ from ...control.settings import MPCSettings
 from ...core.checks import Array
 from ...simulation import Run, Scenario
 from ...zones.ellipses import Ellipse
-from .control import outline_obstacle
-from .palette import BLUE, GREEN, RED
+from .style import BLUE, GREEN, RED, outline_obstacle
 
 _STATIC = Path(__file__).parents[1] / "static"  # what a browser shows
 

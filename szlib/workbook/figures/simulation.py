@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isnan
 from typing import Any
 
@@ -20,20 +20,26 @@ from PIL import Image
 
 from ...core.checks import Array
 from ...simulation import Run, Scenario
-from ...simulation.robot_run import nanmin
 from ...zones.ellipses import Ellipse
-from .control import draw_obstacle
 from .movies import Movie, place_zones
-from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from .style import add_legend_below, draw_person, get_axes, label_metres
+from .style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    RED,
+    add_legend_below,
+    draw_obstacle,
+    draw_person,
+    get_axes,
+    label_metres,
+)
 
 _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
-_ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
+ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 _PADDING = 0.2  # margin around everything that is drawn [m]
 _SAME_PLACE = 0.35  # positions nearer than this share one time label [m]
 # a wall is drawn to its end if the end is at most this far from all else [m]
 _WALL_EXTENT = 3.0
-_CROWD_MARGIN = 3.0  # margin around the robot's path in a crowd [m]
 
 
 def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Axes:
@@ -59,8 +65,8 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
     ax = get_axes(ax, size=(9, 4.5))
     step = max(1, round(every / run.settings.dt))
     shown = np.arange(0, len(run.states), step)
-    _set_limits(ax, [(run, shown)])
-    _draw_scenery(ax, run.scenario)
+    set_limits(ax, [(run, shown)])
+    draw_scenery(ax, run.scenario)
     ax.plot(
         *run.states[:, :2].T,
         "o-",
@@ -71,9 +77,7 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
     )
     for row in shown.tolist():
         depth = run.time[row] / max(run.time[-1], 1e-9)
-        _draw_moving(
-            ax, run, row, robot=_ROBOT_COLOURS(depth), zone=_ZONE_COLOURS(depth)
-        )
+        draw_moving(ax, run, row, robot=_ROBOT_COLOURS(depth), zone=ZONE_COLOURS(depth))
     _write_times(ax, run.time[shown], run.states[shown, :2], colour=BLACK, above=0)
     for i in range(len(run.zones)):
         # dark red
@@ -85,124 +89,6 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
     ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
     add_legend_below(ax, gap=0.14, ncols=6)
     return label_metres(ax, f"{run.scenario.title} (times in s; later is darker)")
-
-
-def plot_barriers(run: Run, *, ax: Axes | None = None) -> Axes:
-    """Plot h of each person and the least h of obstacles over time, on a log scale above 0.5 m.
-
-    Parameters
-    ----------
-    run : the run.
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
-    >>> ax = figures.plot_barriers(log)
-    """
-    ax = get_axes(ax, size=(8, 2.5))
-    n, kinds = len(run.zones), {each.kind for each in run.scenario.fixed}
-    for i, h in enumerate(run.h[:, :n].T):
-        ax.plot(run.time, h, color=RED, label="person" if i == 0 else None)
-    if run.h.shape[1] > n:
-        ax.plot(
-            run.time,
-            run.h[:, n:].min(axis=1),
-            color=BLACK,
-            linestyle=":",
-            label=f"nearest {kinds.pop() if len(kinds) == 1 else 'obstacle'}",
-        )
-    ax.axhline(0, color=GREY, linewidth=1)
-    ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
-    ticks = [0, 0.25, 0.5, 1, 2, 5, 10]
-    ax.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
-    low = np.fmin.reduce(run.h, axis=None, initial=0.0)
-    high = np.fmax.reduce(run.h, axis=None, initial=0.5)
-    ax.set(xlabel="time [s]", ylabel="h [m]", ylim=(1.2 * low - 0.05, 1.3 * high))
-    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
-    return ax
-
-
-def plot_robot_paths(runs: Mapping[str, Run], *, ax: Axes | None = None) -> Axes:
-    """Plot the paths of several runs of one scene, with the zones at the start.
-
-    Parameters
-    ----------
-    runs : name -> run, at most four.
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
-    >>> ax = figures.plot_robot_paths({"gamma = 0.05": log})
-    """
-    ax = get_axes(ax, size=(9, 4))
-    first = next(iter(runs.values()))
-    _set_limits(ax, [(run, np.zeros(1, int)) for run in runs.values()])
-    _draw_scenery(ax, first.scenario)
-    for zone in place_zones(first.zones, first.people[0]):
-        _draw_zone(ax, zone, _ZONE_COLOURS(0.5))
-    styles = zip((BLUE, ORANGE, GREEN, BLACK), ("-", "--", "-.", ":"), strict=True)
-    for (name, run), (colour, line) in zip(runs.items(), styles, strict=False):
-        ax.plot(
-            *run.states[:, :2].T, color=colour, linestyle=line, linewidth=2, label=name
-        )
-    add_legend_below(ax, gap=0.15, ncols=4)
-    return label_metres(ax, first.scenario.title)
-
-
-def plot_crowd(
-    run: Run, *, walked: Array | None = None, ax: Axes | None = None
-) -> Axes:
-    """Plot the paths of the robot and of all people, with a dot each second.
-
-    The robot, people and zones are drawn at the time when the robot is nearest to a person.
-
-    Parameters
-    ----------
-    run : the run.
-    walked : path of the person whom the robot replaces, shape (n, 2) [m].
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
-    >>> ax = figures.plot_crowd(log)
-    """
-    ax = get_axes(ax, size=(6, 5))
-    second = max(1, round(1 / run.settings.dt))
-    distance = np.hypot(run.relative[..., 0], run.relative[..., 1])
-    row = int(nanmin(distance, axis=1).argmin())
-    path = np.vstack([run.states[:, :2], run.scenario.goal])
-    low, high = path.min(axis=0) - _CROWD_MARGIN, path.max(axis=0) + _CROWD_MARGIN
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    for i, (x, y) in enumerate(np.moveaxis(run.people[:, :, :2], 0, -1)):
-        ax.plot(
-            x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None
-        )
-        ax.plot(x[::second], y[::second], ".", color=RED, markersize=3, alpha=0.5)
-    if walked is not None:
-        ax.plot(
-            *walked.T,
-            "--",
-            color=GREEN,
-            linewidth=2,
-            label="person replaced",
-        )
-    ax.plot(*run.states[:, :2].T, color=BLUE, linewidth=2, label="robot")
-    ax.plot(*run.states[::second, :2].T, ".", color=BLUE, markersize=5)
-    _draw_scenery(ax, run.scenario)
-    _draw_moving(ax, run, row, robot=BLUE, zone=RED)
-    return label_metres(ax, run.scenario.title)
 
 
 def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
@@ -226,8 +112,8 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
     rows = np.unique(np.r_[np.arange(0, len(run.states), step), len(run.states) - 1])
     figure = Figure(figsize=(width, width * 0.55), layout="constrained", dpi=70)
     canvas, ax = FigureCanvasAgg(figure), figure.subplots()
-    _set_limits(ax, [(run, rows)])
-    _draw_scenery(ax, run.scenario)
+    set_limits(ax, [(run, rows)])
+    draw_scenery(ax, run.scenario)
     label_metres(ax, "t")
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the layout is done
@@ -238,7 +124,7 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
             *ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1)
         ]
         moving += ax.plot(*run.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
-        moving += _draw_moving(ax, run, row, robot=BLUE, zone=RED)
+        moving += draw_moving(ax, run, row, robot=BLUE, zone=RED)
         ax.set_title(
             f"t = {run.time[row]:4.1f} s, robot at {run.speed[row]:.2f} m/s (shown twice as fast)"
         )
@@ -258,7 +144,7 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
     return Movie(gif.getvalue(), run, (*ax.get_xlim(), *ax.get_ylim()))
 
 
-def _draw_scenery(ax: Axes, scenario: Scenario) -> None:
+def draw_scenery(ax: Axes, scenario: Scenario) -> None:
     """Draw what does not move, within the limits of `ax`: walls, other obstacles, and the goal."""
     for obstacle in scenario.fixed:
         draw_obstacle(ax, obstacle)
@@ -272,7 +158,7 @@ def _draw_scenery(ax: Axes, scenario: Scenario) -> None:
     )
 
 
-def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
+def draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
     (a, b), angle = zone.semi_axes, np.degrees(zone.angle)
     patch = EllipsePatch(
         zone.center, 2 * a, 2 * b, angle=angle, fill=False, edgecolor=colour, lw=1.6
@@ -280,12 +166,10 @@ def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
     return ax.add_patch(patch)
 
 
-def _draw_moving(
-    ax: Axes, run: Run, row: int, *, robot: Any, zone: Any
-) -> list[Artist]:
+def draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[Artist]:
     """Draw robot, zones and people at one time."""
     drawn = [
-        _draw_zone(ax, ellipse, zone)
+        draw_zone(ax, ellipse, zone)
         for ellipse in place_zones(run.zones, run.people[row])
     ]
     position = run.states[row, :2].tolist()
@@ -332,7 +216,7 @@ def _write_times(
         label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
 
 
-def _set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
+def set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
     """Set limits that hold the paths, the goal, and the zones in the rows shown of each run.
 
     Much longer walls (`_WALL_EXTENT`) are cut off.

@@ -1,19 +1,49 @@
-"""The style that all figures share: sizes, labels in metres, people, legends beside the data."""
+"""The style that all figures share: colours, sizes, labels in metres, people, obstacles, legends."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
+import contourpy
 import matplotlib.pyplot as plt
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
+from ...control.obstacles import Obstacle, Wall
+from ...core.checks import Array
 from ...encounters.geometry import Area
+
+BLUE, ORANGE, GREEN = "#0072B2", "#E69F00", "#009E73"
+RED, GREY, BLACK = "#D55E00", "#999999", "#000000"
+SEQUENCE = "viridis"
+# Points on each side of the grid on which the outline of an obstacle is found.
+_GRID = 201
+_CHORD_ERROR = 1e-3  # distance of a corner of this outline that may be left out [m]
+ARROW: dict[str, Any] = {
+    "angles": "xy",
+    "scale_units": "xy",
+    "scale": 1,
+    "width": 0.008,
+    "zorder": 3,
+}
+
+
+def pick_colours(values: Sequence[Any]) -> list[Any]:
+    """Return one colour for each of the `values`, from dark to light, without the palest.
+
+    Examples
+    --------
+    >>> from szlib.workbook import figures
+    >>> len(figures.pick_colours([0.7, 1.1, 1.5]))
+    3
+    """
+    return list(plt.get_cmap(SEQUENCE)(np.linspace(0, 0.85, len(values))))
 
 
 def get_axes(ax: Axes | None, *, size: tuple[float, float] = (6.0, 4.5)) -> Axes:
@@ -133,3 +163,51 @@ def alt_text(figure: Figure) -> str:
         )
         parts.append(f"{part}, with {names}" if names else part)
     return " ".join("; ".join(part for part in parts if part).split())
+
+
+def draw_obstacle(ax: Axes, obstacle: Obstacle) -> list[Array]:
+    """Draw the outline of an `obstacle` within the limits of `ax`, hatched inside, and return its lines."""
+    limits = (*ax.get_xlim(), *ax.get_ylim())
+    lines = outline_obstacle(obstacle, limits)
+    for line in lines:
+        ax.plot(
+            *line.T,
+            color=BLACK,
+            linewidth=3,
+            solid_capstyle="round",
+            label=obstacle.kind,
+        )
+    if not isinstance(obstacle, Wall):
+        x, y, gap = _measure_gap(obstacle, limits)
+        inside = ax.contourf(
+            x, y, gap, levels=[-np.inf, 0.0], colors="none", hatches=["///"]
+        )
+        inside.set(edgecolor=GREY, linewidth=0.0)
+    return lines
+
+
+def outline_obstacle(obstacle: Obstacle, limits: Sequence[float]) -> list[Array]:
+    """The lines where the gap to an `obstacle` is 0, shape (n, 2) each.
+
+    Parameters
+    ----------
+    obstacle : any kind; a wall is its segment.
+    limits : x0, x1, y0, y1 of what is shown [m]; only lines within it are found, except of walls.
+    """
+    if isinstance(obstacle, Wall):
+        return [np.reshape(obstacle.numbers, (2, 2))]
+    generator = contourpy.contour_generator(
+        *_measure_gap(obstacle, limits), line_type=contourpy.LineType.Separate
+    )
+    lines: Any = generator.lines(0.0)
+    straight = [shapely.LineString(line).simplify(_CHORD_ERROR) for line in lines]
+    return [np.array(line.coords) for line in straight]
+
+
+def _measure_gap(
+    obstacle: Obstacle, limits: Sequence[float]
+) -> tuple[Array, Array, Array]:
+    """A grid of points within the `limits`, and the gap to an `obstacle` at each, shape (n, n) [m]."""
+    x0, x1, y0, y1 = limits
+    x, y = np.meshgrid(np.linspace(x0, x1, _GRID), np.linspace(y0, y1, _GRID))
+    return x, y, obstacle.gap(x, y, 0.0, *obstacle.numbers)

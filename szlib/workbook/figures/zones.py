@@ -14,8 +14,18 @@ from matplotlib.collections import PolyCollection
 
 from ...core.errors import DataWarning
 from ...zones.ellipses import Ellipse
-from .palette import BLACK, BLUE, GREY, ORANGE, RED, pick_colours
-from .style import add_legend_below, draw_person, get_axes, label_metres
+from .style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    RED,
+    add_legend_below,
+    draw_person,
+    get_axes,
+    label_metres,
+    pick_colours,
+)
 
 FittedZone = Any
 """A `szlib.SocialZone`; it imports this module for its method `plot`, so it cannot be imported here."""
