@@ -211,7 +211,8 @@ class DriveStep:
         path = Path(points, np.array([0.0, dt]), *bows)
         h = self.scene.barriers.h(points[:, 0], points[:, 1], path.times)
         least = min(h.min(initial=inf), self.scene.bound_gap(path))
-        return self.point.feasible and not self.point.unknown and least >= -TOLERANCE
+        is_clear = bool(least >= -TOLERANCE)
+        return self.point.feasible and not self.point.unknown and is_clear
 
     def verify(self) -> Report:
         """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
