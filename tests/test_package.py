@@ -216,6 +216,19 @@ def test_a_module_does_nothing_when_imported() -> None:
         )
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+def test_imports_start_no_threads() -> None:
+    """Kernels are forked from a process with all imports; a pool of threads of Polars would stop there."""
+    code = """if True:
+        import os
+        import pandas, polars, pyarrow, scipy.spatial, sklearn.neighbors, tqdm
+        before = len(os.listdir("/proc/self/task"))
+        import szlib.encounters.finding, szlib.tracks.readers, szlib.workbook.record
+        print(len(os.listdir("/proc/self/task")) - before)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "0\n", done.stderr
+
+
 def test_the_tests_have_the_same_rooms() -> None:
     tests = Path(__file__).parent
     assert set(ROOMS) <= {path.name for path in tests.iterdir()}
