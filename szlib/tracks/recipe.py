@@ -249,7 +249,8 @@ def _check_zone(tz: str | None) -> None:
     try:
         zone = "UTC" if tz is None else tz
         ZoneInfo(zone)
-        pl.select(pl.from_epoch(pl.lit(0)).dt.convert_time_zone(zone))
+        # Shapes are made at import: a query would start polars' threads, which a forked kernel does not have.
+        pl.Series([0]).cast(pl.Datetime("us", zone))
     except (KeyError, ValueError, OSError, pl.exceptions.PolarsError) as error:
         raise DataError(
             f"unknown time zone {tz!r}; expected one like 'Asia/Tokyo'"
