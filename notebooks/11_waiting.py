@@ -67,7 +67,7 @@ from studies import chains, scenario_runs
 from studies.atlas import AtlasCell
 
 import szlib
-from szlib.simulation.metrics import classify_strategy, find_yielding_steps
+from szlib.simulation.metrics import ACTIVE_RESIDUAL, classify_strategy, find_yielding_steps
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 
@@ -181,6 +181,31 @@ Markdown(
     "on. The robot takes the corner of what is left that is nearest to its goal. Waiting is nothing else: this corner lies "
     "near zero. So the robot hardly ever stands still. It comes slowly nearer, goes aside as the zone comes out, and comes "
     "back behind the zone.\n\n</details>"
+)
+
+# %% [markdown]
+# **What do you think?** The person leaves the passage, and the robot enters it some seconds later (first figure, left). What
+# holds it in between: still the person, or the walls?
+
+# %% jupyter={"source_hidden": true}
+# The answer
+out, enters = (float(log.time[np.argmax(each)]) for each in (log.people[:, 0, 0] < 0, log.states[:, 0] > 0))
+holds = log.residual.min(axis=2) <= ACTIVE_RESIDUAL
+between_both = (log.time >= out) & (log.time < enters)
+by_person, by_walls = between_both & holds[:, 0], between_both & ~holds[:, 0] & holds[:, 1:].any(axis=1)
+last = float(log.time[by_person][-1]) if by_person.any() else out
+beside = float(log.h[by_walls, 1:].min()) if by_walls.any() else np.nan
+record.check(
+    "after the person is out, first the person and then the walls at the mouth hold the robot",
+    (by_person | by_walls).sum() > 0.8 * between_both.sum() and by_walls.any(),
+    f"the person {by_person.sum()}, walls alone {by_walls.sum()} of {between_both.sum()} steps",
+)
+Markdown(
+    f"<details><summary>Answer</summary>\n\nBoth, one after the other. The person is out at {out:.1f} s, but the zone still passes "
+    f"beside the robot: the person's row holds it until {last:.1f} s. It has stepped aside, and now stands beside the corner of the "
+    f"mouth, {100 * beside:.0f} cm from where h of the wall is 0. Eq. 1 lets this h fall by {100 * gamma:g} % in a step, which "
+    f"is {gamma * beside / settings.dt:.2f} m/s: so it creeps around the corner, and is in at {enters:.1f} s. The wait for the person "
+    "is short. The way back from the wall is what takes long.\n\n</details>"
 )
 
 # %% [markdown]
