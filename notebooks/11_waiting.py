@@ -65,6 +65,7 @@ from IPython.display import Markdown
 from laboratory import draw_step, find_admissible_controls
 from studies import chains, scenario_runs
 from studies.atlas import AtlasCell
+from studies.lesson_zones import choose_paper_zone, choose_zone
 
 import szlib
 from szlib.simulation.metrics import ACTIVE_RESIDUAL, classify_strategy, find_yielding_steps
@@ -263,7 +264,7 @@ Markdown(
 starts, firsts = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0), []
 for start in starts:
     scene = replace(scenes["waiting"], people=(szlib.Person((start, 0.0), (-pace, 0.0)),))
-    run = scenario_runs.drive(scene, record.cache.ellipse(), settings)
+    run = scenario_runs.drive(scene, choose_zone(record), settings)
     outside = run.time[run.states[:, 0] < 0]
     entries = run.time[np.argmax(run.states[:, 0] > 0)], outside[-1]
     firsts.append((start / pace, *entries, classify_strategy(run)))
@@ -313,7 +314,7 @@ paces = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
 rows = []
 for each in paces:
     scene = AtlasCell("making_room", width=width, pace=each).scenario()
-    run = scenario_runs.drive(scene, record.cache.ellipse(), settings)
+    run = scenario_runs.drive(scene, choose_zone(record), settings)
     rows.append((run.h[:, 0].min(), run.h[:, 1:].min(), run.metrics()["infeasible_steps"]))
 to_person, to_wall, unsolved = np.array(rows).T
 
@@ -362,8 +363,8 @@ Markdown(
 
 # %% jupyter={"source_hidden": true}
 # Table
-own = record.cache.ellipse(), settings
-papers = record.cache.paper_ellipse(), scenario_runs.paper_settings(settings)
+own = choose_zone(record), settings
+papers = choose_paper_zone(record), scenario_runs.paper_settings(settings)
 compared = chains.compare_chains(papers, own)
 record.table(compared, "10_chains")
 found = compared.set_index(["chain", "scenario"])
@@ -403,10 +404,16 @@ def meet_at_passage(width, pace):
     return World(AtlasCell("waiting", width=width, pace=pace).scenario(), zone)
 
 
-zone = record.cache.ellipse()
+zone = choose_zone(record)
 axes = [Axis("width", "width [m]", (1.6, 2.4)), Axis("pace", "pace [m/s]", (0.3, 0.5, 0.8), 1)]
 recording = Recording("A person comes out of a passage", meet_at_passage, axes, every=3)
 recording
+
+# %% [markdown]
+# With a kernel, the next line opens the live laboratory on the same scene: there you drag the person.
+
+# %%
+recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer
