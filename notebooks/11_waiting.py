@@ -118,10 +118,8 @@ scenario_runs.tabulate_five(named)
 # *Yielding* is time without progress while the barrier of a person holds the robot. The *clearance* is the
 # Euclidean gap from the robot's side to a body or a wall.
 
-# %% jupyter={"source_hidden": true}
-# Animation: waiting
-record.animation(movie := waiting.ours.animate(width=9, every=1.0), "waiting")
-movie
+# %% [markdown]
+# The run in which our robot makes room (waiting can be played at the end of the chapter, in "Try it"):
 
 # %% jupyter={"source_hidden": true}
 # Animation: making room
