@@ -47,9 +47,12 @@ bench: $(INSTALLED)  ## speed and memory, as ratios within one run
 notebooks: $(INSTALLED)  ## execute the committed copies anew, and renew the README's pictures
 	$(BIN)/python notebooks/tools/refresh.py
 
-lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, from pyproject.toml
+lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, from pyproject.toml; and those of Binder
 	$(BIN)/uv pip compile pyproject.toml --universal --all-extras --generate-hashes --upgrade --quiet \
 	    --no-emit-index-url --custom-compile-command "make lock" --output-file environment.lock
+	(echo '# The workbook and what it needs, as in environment.lock.  Made by `make lock`.'; \
+	 $(BIN)/uv pip compile pyproject.toml --universal --extra workbook --constraint environment.lock \
+	    --no-header --no-annotate --quiet) > .binder/requirements.txt
 
 # Warnings are no errors here: old libraries warn of each other, which one test of a fresh process does not allow.
 lowest: $(INSTALLED)  ## the suite without the workbook, with the oldest version of every dependency

@@ -48,7 +48,7 @@ duration = 3.0  # of a window [s]
 min_distance = 1.0  # of the other person when it opens [m]
 min_speed = 0.4  # of the reference pedestrian [m/s]
 has_walls = False  # True: the outline of the area is a wall, and the space may reach beyond it
-examples = 100  # paths drawn
+examples = 25  # paths drawn
 
 # %% jupyter={"source_hidden": true}
 # Set-up, and the figure

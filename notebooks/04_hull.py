@@ -83,6 +83,7 @@ left.set_title(
 )
 left.legend().remove()
 left.set_yticks((-1, 0, 1))
+left.set_box_aspect(None, zoom=1.25)
 lines = zip(
     zone.ellipses, figures.pick_colours(list(zone.ellipses)), ("-", "--", ":", "-.") * 9, strict=False
 )

@@ -63,6 +63,7 @@ import numpy as np
 import plots
 from IPython.display import Markdown
 from matplotlib.patches import Circle
+from studies.lesson_zones import choose_zone
 
 import szlib
 from szlib.control import HalfPlane, barrier, cbf_residual
@@ -71,7 +72,7 @@ from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters
 
 record = NotebookRecord("07_barriers", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, zone_speed=zone_speed)
-zone = record.cache.ellipse()
+zone = choose_zone(record)
 reach = zone.curve()[:, 0].max()
 keep_off = settings.r_robot + settings.eps
 v_max, steps = settings.v_max, np.linspace(0, 3, 61)
@@ -577,6 +578,12 @@ axes = [
 ]
 recording = Recording("A robot and a person in a narrow passage", meet_head_on, axes, longest=9.0)
 recording
+
+# %% [markdown]
+# With a kernel, the next line opens the live laboratory on the same scene: there you drag the person.
+
+# %%
+recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer

@@ -67,13 +67,14 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 from scipy.linalg import block_diag
+from studies.lesson_zones import choose_zone
 
 import szlib
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
 
 record = NotebookRecord("08_build_a_controller", globals(), plaza_zone=True)
-zone = record.cache.ellipse()
+zone = choose_zone(record)
 same = {"gamma": gamma, "N": N, "N_h": N_h, "a_max": a_max}
 paper = szlib.MPCSettings.paper(**same)
 scene = replace(szlib.SCENARIOS["corridor"], start=np.array([-4.0, -0.4, 0, 0]))
@@ -573,6 +574,12 @@ def look_ahead(gamma, n_h):
 axes = [Axis("gamma", "gamma", (0.05, 0.2, 0.8), 1), Axis("n_h", "N_h [steps]", (1, 2, 8))]
 recording = Recording("A person comes, with a barrier on some steps", look_ahead, axes, longest=14.0)
 recording
+
+# %% [markdown]
+# With a kernel, the next line opens the live laboratory on the same scene: there you drag the person.
+
+# %%
+recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer

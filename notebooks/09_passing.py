@@ -60,6 +60,7 @@ import plots
 from IPython.display import Markdown
 from laboratory import draw_step, show_sliders
 from studies import gamma_table, paper_claims, scenario_runs
+from studies.lesson_zones import choose_paper_zone, choose_zone
 from studies.scenario_runs import drive
 
 import szlib
@@ -69,7 +70,7 @@ from szlib.workbook.record import NotebookRecord
 
 record = NotebookRecord("09_passing", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-scenario, zone, paper_zone = szlib.SCENARIOS["passing"], record.cache.ellipse(), record.cache.paper_ellipse()
+scenario, zone, paper_zone = szlib.SCENARIOS["passing"], choose_zone(record), choose_paper_zone(record)
 runs = scenario_runs.drive_both(record, scenario, settings)
 log, metrics = runs.ours, runs.ours.metrics()
 side, low = zip(*((m["passing_side"], m["min_speed"]) for m in (runs.paper.metrics(), metrics)), strict=True)
@@ -100,6 +101,9 @@ movie
 # %% jupyter={"source_hidden": true}
 # Checks
 scenario_runs.record_safety(record, runs)
+
+# %% jupyter={"source_hidden": true}
+# The paper's claims
 scenario_runs.record_both_claims(record, runs)
 
 # %% [markdown]
@@ -400,6 +404,12 @@ axes = [
 ]
 recording = Recording("Passing a person who stands", stand_beside, axes)
 recording
+
+# %% [markdown]
+# With a kernel, the next line opens the live laboratory on the same scene: there you drag the person.
+
+# %%
+recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer

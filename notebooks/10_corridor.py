@@ -57,6 +57,7 @@ from IPython.display import Markdown
 from laboratory import draw_step
 from studies import scenario_runs
 from studies.atlas import AtlasCell
+from studies.lesson_zones import choose_zone
 
 import szlib
 from szlib.simulation.metrics import classify_strategy
@@ -67,7 +68,7 @@ record = NotebookRecord("10_corridor", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario = AtlasCell("corridor", width=width, pace=pace).scenario()
 runs = scenario_runs.drive_both(record, scenario, settings)
-log, zone = runs.ours, record.cache.ellipse()
+log, zone = runs.ours, choose_zone(record)
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 metrics = log.metrics()
 sides = [run.metrics()["passing_side"] for run in (runs.paper, log)]
@@ -303,6 +304,12 @@ def meet_in_corridor(width, pace):
 axes = [Axis("width", "width [m]", (3.8, 4.4, 5.0), 1), Axis("pace", "pace [m/s]", (0.3, 0.7))]
 recording = Recording("A person in a corridor", meet_in_corridor, axes, every=3)
 recording
+
+# %% [markdown]
+# With a kernel, the next line opens the live laboratory on the same scene: there you drag the person.
+
+# %%
+recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer

@@ -65,9 +65,10 @@ from IPython.display import Markdown
 from laboratory import draw_step, find_admissible_controls
 from studies import chains, scenario_runs
 from studies.atlas import AtlasCell
+from studies.lesson_zones import choose_paper_zone, choose_zone
 
 import szlib
-from szlib.simulation.metrics import classify_strategy, find_yielding_steps
+from szlib.simulation.metrics import ACTIVE_RESIDUAL, classify_strategy, find_yielding_steps
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
 
@@ -117,10 +118,8 @@ scenario_runs.tabulate_five(named)
 # *Yielding* is time without progress while the barrier of a person holds the robot. The *clearance* is the
 # Euclidean gap from the robot's side to a body or a wall.
 
-# %% jupyter={"source_hidden": true}
-# Animation: waiting
-record.animation(movie := waiting.ours.animate(width=9, every=1.0), "waiting")
-movie
+# %% [markdown]
+# The run in which our robot makes room (waiting can be played at the end of the chapter, in "Try it"):
 
 # %% jupyter={"source_hidden": true}
 # Animation: making room
@@ -184,6 +183,31 @@ Markdown(
 )
 
 # %% [markdown]
+# **What do you think?** The person leaves the passage, and the robot enters it some seconds later (first figure, left). What
+# holds it in between: still the person, or the walls?
+
+# %% jupyter={"source_hidden": true}
+# The answer
+out, enters = (float(log.time[np.argmax(each)]) for each in (log.people[:, 0, 0] < 0, log.states[:, 0] > 0))
+holds = log.residual.min(axis=2) <= ACTIVE_RESIDUAL
+between_both = (log.time >= out) & (log.time < enters)
+by_person, by_walls = between_both & holds[:, 0], between_both & ~holds[:, 0] & holds[:, 1:].any(axis=1)
+last = float(log.time[by_person][-1]) if by_person.any() else out
+beside = float(log.h[by_walls, 1:].min()) if by_walls.any() else np.nan
+record.check(
+    "after the person is out, first the person and then the walls at the mouth hold the robot",
+    (by_person | by_walls).sum() > 0.8 * between_both.sum() and by_walls.any(),
+    f"the person {by_person.sum()}, walls alone {by_walls.sum()} of {between_both.sum()} steps",
+)
+Markdown(
+    f"<details><summary>Answer</summary>\n\nBoth, one after the other. The person is out at {out:.1f} s, but the zone still passes "
+    f"beside the robot: the person's row holds it until {last:.1f} s. It has stepped aside, and now stands beside the corner of the "
+    f"mouth, {100 * beside:.0f} cm from where h of the wall is 0. Eq. 1 lets this h fall by {100 * gamma:g} % in a step, which "
+    f"is {gamma * beside / settings.dt:.2f} m/s: so it creeps around the corner, and is in at {enters:.1f} s. The wait for the person "
+    "is short. The way back from the wall is what takes long.\n\n</details>"
+)
+
+# %% [markdown]
 # ## A speed limit below zero
 #
 # Now the robot is in the passage. It is $h = 0.6$ m away from the zone of a person who walks towards it at
@@ -238,7 +262,7 @@ Markdown(
 starts, firsts = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0), []
 for start in starts:
     scene = replace(scenes["waiting"], people=(szlib.Person((start, 0.0), (-pace, 0.0)),))
-    run = scenario_runs.drive(scene, record.cache.ellipse(), settings)
+    run = scenario_runs.drive(scene, choose_zone(record), settings)
     outside = run.time[run.states[:, 0] < 0]
     entries = run.time[np.argmax(run.states[:, 0] > 0)], outside[-1]
     firsts.append((start / pace, *entries, classify_strategy(run)))
@@ -288,7 +312,7 @@ paces = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
 rows = []
 for each in paces:
     scene = AtlasCell("making_room", width=width, pace=each).scenario()
-    run = scenario_runs.drive(scene, record.cache.ellipse(), settings)
+    run = scenario_runs.drive(scene, choose_zone(record), settings)
     rows.append((run.h[:, 0].min(), run.h[:, 1:].min(), run.metrics()["infeasible_steps"]))
 to_person, to_wall, unsolved = np.array(rows).T
 
@@ -337,8 +361,8 @@ Markdown(
 
 # %% jupyter={"source_hidden": true}
 # Table
-own = record.cache.ellipse(), settings
-papers = record.cache.paper_ellipse(), scenario_runs.paper_settings(settings)
+own = choose_zone(record), settings
+papers = choose_paper_zone(record), scenario_runs.paper_settings(settings)
 compared = chains.compare_chains(papers, own)
 record.table(compared, "10_chains")
 found = compared.set_index(["chain", "scenario"])
@@ -378,10 +402,16 @@ def meet_at_passage(width, pace):
     return World(AtlasCell("waiting", width=width, pace=pace).scenario(), zone)
 
 
-zone = record.cache.ellipse()
+zone = choose_zone(record)
 axes = [Axis("width", "width [m]", (1.6, 2.4)), Axis("pace", "pace [m/s]", (0.3, 0.5, 0.8), 1)]
 recording = Recording("A person comes out of a passage", meet_at_passage, axes, every=3)
 recording
+
+# %% [markdown]
+# With a kernel, the next line opens the live laboratory on the same scene: there you drag the person.
+
+# %%
+recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer

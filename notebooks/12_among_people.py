@@ -58,6 +58,7 @@ import pandas as pd
 import plots
 import shapely
 from IPython.display import Markdown, display
+from studies.lesson_zones import choose_zone
 
 import szlib
 from szlib.control import ways
@@ -67,7 +68,7 @@ from szlib.workbook import figures
 from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters, read_table
 
 record = NotebookRecord("12_among_people", globals(), plaza_zone=True)
-zone, paper = record.cache.ellipse(), szlib.MPCSettings.paper()
+zone, paper = choose_zone(record), szlib.MPCSettings.paper()
 among = replace(szlib.MPCSettings.among_people(), time_limit=np.inf)
 rng = np.random.default_rng(seed)
 side, row = np.tile([-1, 1], 4), np.repeat(np.arange(4), 2)
@@ -622,6 +623,12 @@ axes = [
 ]
 recording = Recording("Two doors", choose_door, axes, every=3)
 recording
+
+# %% [markdown]
+# With a kernel, the next line opens the live laboratory on the same scene: there you drag the person.
+
+# %%
+recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer

@@ -46,12 +46,13 @@ results = "../results"
 import numpy as np
 import pandas as pd
 from laboratory import PRESETS, Laboratory, RobotOptions, World, draw_step, explain, is_interactive
+from studies.lesson_zones import choose_zone
 
 import szlib
 from szlib.workbook.record import NotebookRecord
 
 record = NotebookRecord("13_laboratory", globals(), plaza_zone=True)
-zone = record.cache.ellipse()
+zone = choose_zone(record)
 still = World(PRESETS["corridor"], zone)
 while still.n * still.dt < 4.0:
     still.advance()

@@ -34,6 +34,12 @@ from judges.qp import solve_qp
 import szlib
 from szlib.workbook import figures
 
+DT = 0.1  # time of a step [s]
+RADIUS = 1.0  # h = 0 at this distance from a person's centre [m]
+V_MAX = 1.0  # 5.5, 5.6: largest velocity of the robot on each axis [m/s]
+A_MAX = 2.0  # 5.7: largest acceleration of the robot on each axis [m/s2]
+N = 15  # steps of a plan
+
 # %% [markdown]
 # ## 5.1 Focal distance (15 min)
 #
@@ -124,13 +130,6 @@ judges.check("end_margin", end_margin)
 # The next three tasks begin a controller; sheet 6 goes on with it. The checks of 5.5 and 5.6 drive a robot with your function
 # through worlds that you have not seen. If it does not arrive with $h \ge 0$ at every step, the check says when and why, and
 # `judges.plot("filter_1d", filter_1d, seed=..., number=...)` shows that world.
-
-# %%
-DT = 0.1  # time of a step [s]
-RADIUS = 1.0  # h = 0 at this distance from a person's centre [m]
-V_MAX = 1.0  # 5.5, 5.6: largest velocity of the robot on each axis [m/s]
-A_MAX = 2.0  # 5.7: largest acceleration of the robot on each axis [m/s2]
-N = 15  # steps of a plan
 
 # %% [markdown]
 # `solve_qp(H, f, rows, least, low, high)` gives the z with the smallest $\tfrac12 z^\top H z + f^\top z$ for

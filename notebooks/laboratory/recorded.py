@@ -22,6 +22,8 @@ from szlib.core.errors import DataError
 from szlib.workbook.figures.movies import read_scripts, scene_layout
 
 from .explanation import explain, name_limit
+from .sliders import is_interactive
+from .widget import Laboratory
 from .world import World
 
 LARGEST = 250_000  # of a recording in a page [bytes]
@@ -88,6 +90,7 @@ class Recording:
         every: int = 2,
     ) -> None:
         self.title, self.table = title, list[dict[str, Any]]()
+        self._make_world, self._shown = make_world, {each.name: each.values[each.start] for each in axes}
         texts: dict[str, int] = {}
         worlds, runs, places = [], [], [np.empty((0, 2))]
         for values in product(*(axis.values for axis in axes)):
@@ -116,6 +119,13 @@ class Recording:
             raise DataError(
                 f"the recording {title!r} has {len(self.packed)} bytes; expected at most {LARGEST}: record fewer runs"
             )
+
+    def open_live(self) -> Laboratory | None:
+        """The live laboratory on the scene that is shown first; None where no page of JupyterLab runs this."""
+        if not is_interactive():
+            return None
+        world = self._make_world(**self._shown)
+        return Laboratory(world.scenario, zone=world.zone, robots=world.robots)
 
     def __repr__(self) -> str:
         return f"{self.title}: {len(self.table)} recorded runs"

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pandas.io.formats.style import Styler
 from studies import paper_claims
+from studies.lesson_zones import choose_paper_zone, choose_zone
 
 import szlib
 from szlib.simulation.metrics import ACTIVE_RESIDUAL
@@ -60,8 +61,8 @@ def drive(scenario: Scenario, zone: szlib.Ellipse, settings: szlib.MPCSettings) 
 
 def drive_both(record: NotebookRecord, scenario: Scenario, settings: szlib.MPCSettings) -> ScenarioRuns:
     """Drive a `scenario` with the paper's chain, and with our zone and `settings`."""
-    paper = drive(scenario, record.cache.paper_ellipse(), paper_settings(settings))
-    return ScenarioRuns(paper, drive(scenario, record.cache.ellipse(), settings))
+    paper = drive(scenario, choose_paper_zone(record), paper_settings(settings))
+    return ScenarioRuns(paper, drive(scenario, choose_zone(record), settings))
 
 
 def list_parameters(settings: szlib.MPCSettings, *more: tuple[str, object, str, str]) -> Styler:

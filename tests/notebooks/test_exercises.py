@@ -190,6 +190,16 @@ def test_a_failing_case_can_be_run_again():
     assert str(check("wall_distance", wrong, seed=seed)) == str(verdict)
 
 
+@pytest.mark.parametrize("name", TASKS)
+def test_a_message_shows_at_most_eight_numbers_of_a_case(name):
+    if name in LONG or TASKS[name][2].plot:
+        pytest.skip("it has worlds to draw, or takes long")
+    (verdict,) = judge(name, lambda *_: None, [SEED])
+    shown = verdict.message.partition("\n    for ")[2].partition("\n")[0]
+    values = re.sub(r"shape \([^)]*\)|a table of \d+ rows", "", shown)
+    assert len(re.findall(r"(?<![\w.])-?\d+\.?\d*(?:e-?\d+)?", values)) <= 8, shown
+
+
 def szlib_free_line(points, a, b):
     return (
         (points - a)[:, 0] * (b - a)[1] - (points - a)[:, 1] * (b - a)[0]

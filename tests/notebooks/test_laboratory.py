@@ -3,17 +3,28 @@
 import doctest
 import io
 import json
+from dataclasses import replace
 from threading import Thread
 
 import laboratory
 import numpy as np
 import pytest
 import shapely
-from laboratory import PRESETS, Laboratory, RobotOptions, World, explain, show_sliders
+from laboratory import (
+    PRESETS,
+    Axis,
+    Laboratory,
+    Recording,
+    RobotOptions,
+    World,
+    explain,
+    show_sliders,
+)
 from laboratory.explanation import name_limit
 from PIL import Image
 
 import szlib
+from szlib.workbook import folders
 
 ZONE = szlib.Ellipse((0.03, 0.0), (0.97, 0.75))
 PAPER, AMONG_PEOPLE = (
@@ -317,6 +328,22 @@ def test_a_scene_of_ones_own_is_opened():
         szlib.SolverError, match="scenario must be one of passing, corridor"
     ):
         Laboratory("nowhere")
+
+
+def test_a_recording_opens_the_laboratory_on_its_scene(monkeypatch):
+    def make(gamma, y):
+        person = szlib.Person((0.0, y), heading=np.pi)
+        scene = replace(PRESETS["passing"], people=(person,))
+        return World(scene, ZONE, [RobotOptions(changes={"gamma": gamma})])
+
+    axes = [Axis("gamma", "gamma", (0.05, 0.3), 1), Axis("y", "y [m]", (0.5,))]
+    recording = Recording("Passing", make, axes, longest=0.2)
+    assert recording.open_live() is None, "a headless run has no page"
+    monkeypatch.setenv("JPY_SESSION_NAME", "chapter.ipynb")
+    monkeypatch.delenv(folders.RUN_VARIABLE, raising=False)
+    world = recording.open_live().world
+    assert world.people[0].position == (0.0, 0.5)
+    assert world.robots[0].settings.gamma == 0.3 and world.zone == ZONE
 
 
 NAN = float("nan")

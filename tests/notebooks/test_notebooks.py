@@ -14,8 +14,11 @@ from szlib.workbook import folders
 from szlib.workbook.record.parameters import METHOD_DEFAULTS, read_defaults
 
 SOURCES = folders.list_notebooks()
-MAX_LINES = 25
-"""Lines of the longest cell, and visible lines of code before the first figure."""
+MAX_LINES, SET_UP = 25, 60
+"""Lines of the longest cell and before the first figure; of the folded set-up with its figure."""
+MAX_CHECKS = 8
+"""Checks and claims that a cell shows; the outputs of longer lists are folded."""
+CHAPTERS = [s for s in SOURCES if "01" <= s.stem[:2] <= "13"]
 
 
 def cells(source: Path) -> list[nbformat.NotebookNode]:
@@ -109,9 +112,10 @@ class TestEach:
         assert any(end in cell.source for cell in all_cells[-3:] for end in ends)
         assert all_cells[-1].source.endswith("record.close()")
         assert sum("parameters" in c.metadata.get("tags", []) for c in all_cells) == 1
-        assert (
-            max(code_lines(c) for c in all_cells if c.cell_type == "code") <= MAX_LINES
-        )
+        code = [c for c in all_cells if c.cell_type == "code"]
+        lengths = {c.source.splitlines()[0]: code_lines(c) for c in code}
+        limit = dict.fromkeys(lengths, MAX_LINES) | {"# Set-up, and the figure": SET_UP}
+        assert {k: n for k, n in lengths.items() if n > limit[k]} == {}
 
     def test_notebook_has_the_common_parameters(self, source):
         (tagged,) = [
@@ -153,6 +157,24 @@ class TestShape:
 
     def test_the_copy_has_at_most_600_kb(self, source):
         assert source.with_suffix(".ipynb").stat().st_size <= 600_000
+
+
+@pytest.mark.parametrize("source", CHAPTERS, ids=lambda s: s.stem)
+class TestChapter:
+    def test_two_folded_cells_stand_before_the_first_picture(self, source):
+        """The parameters, which papermill replaces, and the set-up, which draws it."""
+        code = [c for c in cells(source) if c.cell_type == "code"]
+        assert "parameters" in code[0].metadata["tags"]
+        assert code[1].source.startswith("# Set-up, and the figure\n")
+        assert "record.figure(" in code[1].source
+        assert is_hidden(code[0]) and is_hidden(code[1])
+
+    def test_at_most_eight_checks_are_shown_at_once(self, source):
+        executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
+        for cell in executed.cells:
+            text = "".join(o.get("text", "") for o in cell.get("outputs", ()))
+            is_folded = cell.metadata.get("jupyter", {}).get("outputs_hidden")
+            assert is_folded or len(RESULT.findall(text)) <= MAX_CHECKS, cell.source
 
 
 def test_method_parameters_have_the_same_default_everywhere():

@@ -1,12 +1,15 @@
 """Both runs of a scenario for the chapters 09 to 11, and the five numbers that they show."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
-from studies import chains, scenario_runs
+from studies import chains, lesson_zones, scenario_runs
 from studies.atlas import REFERENCE
 
 import szlib
+from szlib.workbook.record import NotebookRecord
 
 SETTINGS = szlib.MPCSettings(gamma=0.08, N=6)
 
@@ -64,3 +67,31 @@ def test_a_change_is_described_by_what_changed():
         chains.describe_change(found, "side rule", "passing")
         == "least h 0.17 to 0.21 m; side left to right"
     )
+
+
+@pytest.mark.parametrize(
+    ("axes", "data", "is_kept"),
+    [
+        ((0.4, 0.3), "hall.csv", True),
+        ((0.97, 0.75), "hall.csv", True),
+        ((1.3, 1.2), "hall.csv", False),
+        ((1.8, 1.0), "hall.csv", False),
+        ((1.3, 1.2), "synthetic", True),
+    ],
+)
+def test_a_lesson_takes_the_plazas_zone_where_its_scenes_have_no_room(
+    axes, data, is_kept, tmp_path, capsys
+):
+    if data != "synthetic":
+        data = str(tmp_path / data)
+        Path(data).write_text("t,id,x,y\n0,1,0,0\n")
+    given = {"data": data, "results": str(tmp_path / "results"), "zone_speed": 1.1}
+    record = NotebookRecord("99_test", given, plaza_zone=True)
+    capsys.readouterr()
+    zone = szlib.Ellipse((0.0, 0.0), axes)
+    chosen = lesson_zones.fit_to_scenes(record, zone, "The zone of this data")
+    said = capsys.readouterr().out
+    assert (chosen == zone) == is_kept
+    assert ("they take the plaza's zone" in said) != is_kept
+    if not is_kept:
+        assert chosen == szlib.PlazaSettings().true_zone(1.1)

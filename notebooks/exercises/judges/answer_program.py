@@ -69,7 +69,7 @@ def refuse(name: str) -> NoReturn:
     """Stand for what a part of szlib does not have."""
     if name.startswith("__"):
         raise AttributeError(name)
-    raise ImportError(f"no answer: this uses {name}; the task is to write it yourself")
+    raise ImportError(f"no answer: this uses szlib's or the judges' {name}; the task is to write it yourself")
 
 
 def guard(folder: str, modules: tuple[str, ...], leave: Callable[[str], None]) -> None:

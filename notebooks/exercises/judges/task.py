@@ -32,7 +32,7 @@ Rng = np.random.Generator
 Judge = Callable[[Args, Any], str]
 
 _MANY = 40  # cases of a check: a mistake that shows in one case of three passes once in ten million checks
-_MAX_SHOWN = 130  # numbers of an array in a message
+_MAX_SHOWN = 8  # numbers of the arguments in a message
 ESSAY_MINUTES = 10  # of a sheet
 
 
@@ -147,7 +147,11 @@ class Task:
             if self.solution
             else [""] * (len(args) - self.hidden)
         )
-        shown = ", ".join(f"{name}{show(arg)}" for name, arg in zip(names, args, strict=False))
+        texts, room = [], _MAX_SHOWN
+        for name, arg in zip(names, args, strict=False):
+            texts.append(f"{name}{show(arg, room)}")
+            room -= size if (size := getattr(arg, "size", 1)) <= room else 0
+        shown = ", ".join(texts)
         again = f"{self.name}(*judges.case({self.name!r}, seed={seed}, number={number}))"
         return "" if self.drive else f"\n    for {shown}\n    the same case again: {again}"
 
@@ -229,13 +233,13 @@ def _kind(array: Any) -> str:
     return f"{what[1]}, shape {array.shape}" if array.shape else what[0]
 
 
-def show(value: Any) -> str:
-    """A value to copy; only the size of a long one."""
+def show(value: Any, room: int) -> str:
+    """A value to copy; only the size of one with more than `room` numbers."""
     if isinstance(value, pd.DataFrame):
-        columns = value.to_dict("list") if value.size <= _MAX_SHOWN else f"a table of {len(value)} rows"
+        columns = value.to_dict("list") if value.size <= room else f"a table of {len(value)} rows"
         return str(columns)
     if isinstance(value, np.ndarray):
-        if value.size > _MAX_SHOWN:
+        if value.size > room:
             return _kind(value)
         numbers = value.astype(int) if value.dtype == bool else value
         text = np.array2string(numbers, separator=", ", floatmode="unique")
