@@ -23,6 +23,7 @@ from .encounters import (
     plot_distance_by_direction,
     plot_encounter_paths,
     plot_relative_positions,
+    reference_frame,
 )
 from .tracks import plot_funnel, plot_speed_histogram
 from .zones import plot_hull, plot_outliers

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -301,23 +301,6 @@ class HullEstimator(Estimator):
                     )
                     start[j] = np.flatnonzero(is_support).tolist()
         return ellipses
-
-    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
-        """Row numbers of the encounters with a vertex of the hull, for any `speeds`."""
-        return np.unique(self.number[_convex_hull(self.points).vertices])
-
-    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
-        """As `Estimator.leave_one_out` at `speeds`, with only the points that can become vertices.
-
-        These are the points of influential encounters, and the vertices of the hull of all other points.
-        """
-        of_influential = np.isin(self.number, self.find_influential(speeds))
-        rows = np.flatnonzero(of_influential)
-        with suppress(ZoneError):
-            rest = np.flatnonzero(~of_influential)
-            rows = np.union1d(rows, rest[_convex_hull(self.points[rest]).vertices])
-        shell = replace(self, points=self.points[rows], number=self.number[rows])
-        return Estimator.leave_one_out(shell, speeds)
 
 
 def _reach(along: Array, offsets: Array) -> Array:

@@ -42,7 +42,6 @@ from .uncertainty import (
     estimate_uncertainty,
 )
 from .verdict import Verdict, describe_missing_encounters, judge
-from .zone_export import as_geojson, as_latex, as_ros_params
 from .zone_file import read_zone, write_zone
 
 if TYPE_CHECKING:
@@ -353,8 +352,7 @@ class SocialZone:
         """One row for each fitted speed.
 
         Columns: speed [m/s]; center_x, center_y, a, b [m], angle_deg [deg], area [m2], each with _low and
-        _high (its interval, NaN if there is none); influence: the greatest change if one encounter is left
-        out [m]; encounters within r_max at that speed; adequate; verdict.
+        _high (its interval, NaN if there is none); encounters within r_max at that speed; adequate; verdict.
         """
         ellipses = sorted(self.ellipses.items())
         rows = [
@@ -363,7 +361,7 @@ class SocialZone:
         ]
         table = pd.DataFrame(rows, columns=["speed", *QUANTITIES]).set_index("speed")
         ends = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
-        table[[*ends, "influence", "encounters"]] = np.nan
+        table[[*ends, "encounters"]] = np.nan
         if self.uncertainty is not None:
             intervals = self.uncertainty.intervals.pivot(
                 index="speed", columns="quantity"
@@ -373,7 +371,6 @@ class SocialZone:
                     intervals["low"][name],
                     intervals["high"][name],
                 )
-            table["influence"] = self.uncertainty.influence.set_index("speed")["metres"]
         if self.side_counts is not None:
             table["encounters"] = self.side_counts.set_index("speed")["encounters"]
         verdicts = [str(self.verdict(v)) for v in table.index]
@@ -388,38 +385,6 @@ class SocialZone:
         return (
             plot_zones(self, ax=ax) if speed is None else plot_zone(self, speed, ax=ax)
         )
-
-    def to_geojson(self, *, n: int = 72) -> str:
-        """The ellipses as GeoJSON text: a polygon of `n` corners for each speed, with its verdict.
-
-        Coordinates are metres in the frame of the person, x ahead, y to the left: no longitudes.
-
-        Examples
-        --------
-        >>> import json, szlib
-        >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=300))
-        >>> samples = szlib.find_encounters(szlib.read_tracks(path))
-        >>> zone = szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0)
-        >>> json.loads(zone.to_geojson())["features"][0]["geometry"]["type"]
-        'Polygon'
-        """
-        return as_geojson(self, n)
-
-    def to_ros_params(self, *, layer: str = "social_zone") -> str:
-        """The ellipses as YAML text: parameters of ROS 2, lists with one entry for each speed.
-
-        They stand under ``/**: ros__parameters``, so that every node finds them in the name of the costmap
-        `layer`: speeds [m/s], center_x, center_y, semi_major, semi_minor [m], angle [rad], verdict, and the
-        radius [m] of the circle that contains the zone in every direction, for layers that know only circles.
-        """
-        return as_ros_params(self, layer)
-
-    def to_latex(self) -> str:
-        """The table of semi-axes, intervals, encounters and verdicts as LaTeX, for the package booktabs.
-
-        It needs no other package; `pandas.DataFrame.to_latex`, for all columns of `table`, needs Jinja2.
-        """
-        return as_latex(self)
 
     def save(self, path: str | Path) -> None:
         """Write the zone as JSON to the file `path`, as a whole or not at all."""

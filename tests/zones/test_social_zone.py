@@ -357,7 +357,7 @@ def test_saved_zone_loads_bit_by_bit(
 def test_file_states_format_version_and_units(zone: SocialZone, tmp_path: Path) -> None:
     zone.save(str(tmp_path / "zone.json"))
     content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
-    assert (content["format"], content["version"]) == ("szlib.SocialZone", 3)
+    assert (content["format"], content["version"]) == ("szlib.SocialZone", 4)
     assert "m, s, rad" in content["units"]
     assert content["provenance"]["szlib"] == szlib.__version__
 
@@ -410,7 +410,7 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
     "a list": (lambda _: "[1, 2]", "is JSON but no zone"),
     "null": (lambda _: "null", "is JSON but no zone"),
     "other JSON": (lambda _: '{"type": "FeatureCollection"}', "is JSON but no zone"),
-    "newer": (broken(lambda c: c.update(version=4)), r"version 4, .* reads 3; install the szlib"),
+    "newer": (broken(lambda c: c.update(version=5)), r"version 5, .* reads 4; install the szlib"),
     "older": (broken(lambda c: c.update(version=1)), "has format version 1, .* fit the zone again"),
     "no version": (broken(lambda c: c.pop("version") and None), "has format version None"),
     "no r_max": (broken(lambda c: c.pop("r_max") and None), CHECKSUM),
@@ -426,8 +426,8 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
     "no hull": (broken(lambda c: c.update(hull_vertices=None)), CHECKSUM),
     "an unknown method": (broken(lambda c: c.update(method="guess")), CHECKSUM),
     "a method without its radii": (broken(lambda c: c.update(method="quantile")), CHECKSUM),
-    "counts without sides": (broken(lambda c: c["seen"].pop("behind") and None), CHECKSUM),
-    "ragged counts": (broken(lambda c: c["seen"]["left"].pop() and None), CHECKSUM),
+    "counts without sides": (broken(lambda c: c["side_counts"].pop("behind") and None), CHECKSUM),
+    "ragged counts": (broken(lambda c: c["side_counts"]["left"].pop() and None), CHECKSUM),
     "no interval": (broken(lambda c: c["uncertainty"].pop("intervals") and None), CHECKSUM),
     "no provenance": (broken(lambda c: c.update(provenance=3)), CHECKSUM),
     "a centre of digits": (broken(lambda c: c["ellipses"][0].update(center="12")), CHECKSUM),
@@ -502,7 +502,7 @@ def test_zone_of_every_method_drives_the_robot_and_reloads(
     assert loaded.ellipse(1.05) == zone.ellipse(1.05)
     np.testing.assert_array_equal(loaded.boundary(1.05), zone.boundary(1.05))
     pd.testing.assert_frame_equal(loaded.table(), zone.table())
-    for name in ("intervals", "bands", "influence"):
+    for name in ("intervals", "bands"):
         pd.testing.assert_frame_equal(
             getattr(loaded.uncertainty, name), getattr(zone.uncertainty, name)
         )
@@ -519,8 +519,8 @@ def test_intervals_do_not_change_the_zone(
     assert plain.ellipses == zone.ellipses
     np.testing.assert_array_equal(plain.shape.vertices, zone.shape.vertices)
     assert plain.uncertainty is None
-    assert plain.table().filter(regex="_low$|_high$|influence").isna().all(axis=None)
-    assert zone.table().filter(regex="_low$|_high$|influence").notna().all(axis=None)
+    assert plain.table().filter(regex="_low$|_high$").isna().all(axis=None)
+    assert zone.table().filter(regex="_low$|_high$").notna().all(axis=None)
 
 
 @pytest.mark.parametrize(
