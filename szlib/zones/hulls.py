@@ -237,17 +237,14 @@ class HullEstimator(Estimator):
         r_max: float,
         fraction: float | None = None,
         n_neighbours: int | None = None,
-        speed_scale: float | None = None,
     ) -> HullEstimator:
         """Remove outliers from samples; parameters and errors as in `szlib.remove_outliers`.
 
         Parameters
         ----------
-        samples, r_max, fraction, n_neighbours, speed_scale : as in `szlib.remove_outliers`.
+        samples, r_max, fraction, n_neighbours : as in `szlib.remove_outliers`.
         """
-        options: dict[str, Any] = {
-            "fraction": fraction, "n_neighbours": n_neighbours, "speed_scale": speed_scale
-        }  # fmt: skip
+        options: dict[str, Any] = {"fraction": fraction, "n_neighbours": n_neighbours}
         inliers = remove_outliers(samples, r_max=r_max, **options)
         speed = inliers["speed"].to_numpy(float)
         points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])

@@ -32,7 +32,7 @@ from .hulls import HullEstimator, HullZone
 from .outliers import FRACTION, N_NEIGHBOURS, R_MAX, encounter_numbers
 from .quantile import QuantileEstimator
 from .respect import RespectEstimator
-from .respect_significance import NullTest, fit_null_radii, null_test
+from .respect_test import NullTest, null_test
 from .uncertainty import (
     N_RESAMPLES,
     QUANTITIES,
@@ -59,7 +59,7 @@ METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
         ),
         (),
     ),
-    "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
+    "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours")),
     "respect": (RespectEstimator.from_samples, ()),
 }
 
@@ -79,8 +79,6 @@ class SocialZone:
     side_counts : encounters by speed and side (see `szlib.zones.count_by_side`); None: unknown.
     uncertainty : intervals; None: unknown.
     null_test : the test against the null model; None: not tested.
-    null_radii : mean radius by speed of the zone that the same method gives people who ignore each other, the
-        largest of several draws from the null model [m]; empty: not tested.
 
     Raises
     ------
@@ -108,7 +106,6 @@ class SocialZone:
     side_counts: pd.DataFrame | None = None
     uncertainty: Uncertainty | None = None
     null_test: NullTest | None = None
-    null_radii: dict[float, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check_method(self.method)
@@ -178,7 +175,7 @@ class SocialZone:
             intervals.
         seed : of the resampling.
         options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05), used
-            with None too where the quantile is taken. "hull": `fraction`, `n_neighbours` and `speed_scale` as
+            with None too where the quantile is taken. "hull": `fraction` and `n_neighbours` as
             in `szlib.remove_outliers`. "paper", "respect": none.
 
         Raises
@@ -243,7 +240,7 @@ class SocialZone:
             },
             "funnel": estimator.funnel,
         }
-        test, null_radii = None, {}
+        test = None
         if null is not None:
             require(
                 r_max <= null.r_max,
@@ -253,13 +250,6 @@ class SocialZone:
                 ZoneError,
             )
             test = null_test(samples, null)
-            null_radii = (
-                dict.fromkeys(ellipses, 0.0)  # it is the difference from the null model
-                if method == "respect"
-                else fit_null_radii(
-                    build, null, len(estimator.encounters), list(ellipses), seed
-                )
-            )
         sides = uncertainty = None
         if "encounter" in samples:
             sides = count_by_side(samples, fitted_speeds, r_max=r_max)
@@ -277,7 +267,6 @@ class SocialZone:
             sides,
             uncertainty,
             test,
-            null_radii,
         )
         problems = [
             *undefined.values(),

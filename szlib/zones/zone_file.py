@@ -22,8 +22,7 @@ from ..encounters.sensors import SensorCheck
 from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone
-from .respect_profile import RespectRadius
-from .respect_significance import NullTest
+from .respect_test import NullTest, RespectRadius
 from .uncertainty import Uncertainty
 from .verdict import Verdict
 
@@ -60,10 +59,6 @@ def write_zone(
         "side_counts": fields["side_counts"],
         "uncertainty": fields["uncertainty"],
         "null_test": fields["null_test"],
-        "null_radii": [
-            {"speed": v, "radius": r if np.isfinite(r) else None}
-            for v, r in fields["null_radii"].items()
-        ],
         "verdicts": [
             {"speed": v, "verdict": each, "reasons": each.reasons}
             for v, each in verdicts.items()
@@ -162,10 +157,6 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "side_counts": None if side_counts is None else _table(side_counts),
         "uncertainty": uncertainty,
         "null_test": null_test,
-        "null_radii": {
-            float(each["speed"]): float(np.array(each["radius"], float))
-            for each in content["null_radii"]
-        },
     }
 
 
