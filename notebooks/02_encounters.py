@@ -61,7 +61,6 @@ from matplotlib.patches import Rectangle
 from studies import real_day
 
 import szlib
-from szlib.encounters.samples import reference_frame
 from szlib.tracks import funnels
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
@@ -84,7 +83,7 @@ left.set(xlim=(-0.7, 5.4), ylim=(-2.3, 3.9))
 figures.label_metres(left, "Seen at 45°: ahead, to the left", person=True).legend(
     loc="upper right", fontsize=8
 )
-paths = reference_frame(tracks, samples)
+paths = plots.reference_frame(tracks, samples)
 plots.plot_encounter_paths(paths, n_shown=examples, ax=right)
 right.set_title(f"{min(examples, count)} of {count:,} encounters")
 right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)

@@ -40,7 +40,7 @@ PUBLIC = [
     "Person", "PlazaSettings", "ReferenceZone", "Region",
     "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",
-    "ZoneError", "as_area", "ellipse_distance", "encounter_kinds", "extract_days",
+    "ZoneError", "as_area", "ellipse_distance", "extract_days",
     "find_encounters", "find_pairs", "make_plaza", "minimum_enclosing_ellipse",
     "null_encounters", "null_pairs", "null_test", "of_kind", "read_tracks",
     "reference_zone", "remove_outliers",

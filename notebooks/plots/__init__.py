@@ -24,6 +24,7 @@ from .encounters import (
     plot_distance_by_direction,
     plot_encounter_paths,
     plot_relative_positions,
+    reference_frame,
 )
 from .simulation import plot_crowd, plot_robot_paths
 from .tracks import plot_funnel, plot_map, plot_speed_histogram

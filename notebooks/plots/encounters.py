@@ -14,7 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from PIL import Image
 
+from szlib.core.checks import check_columns, check_rows
 from szlib.core.errors import DataError
+from szlib.encounters.samples import SAMPLE_COLUMNS
+from szlib.tracks.clock import COLUMNS, nearest_tick
 from szlib.workbook.figures.style import (
     BLACK,
     BLUE,
@@ -44,6 +47,75 @@ _PEOPLE = {
 _N_BINS = 40  # cells across r_max, or twice r_max: 5 or 10 cm for the paper's 2 m
 
 
+def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame:
+    """Transform both people's paths of each encounter to the reference pedestrian's frame *at the opening*.
+
+    Parameters
+    ----------
+    tracks : the track table in which the encounters were found.
+    samples : samples as from `szlib.find_encounters`, before outliers are removed: the first sample of an
+        encounter is its opening.
+
+    Returns
+    -------
+    One row for each row of `samples`, in their order: encounter, t [s], ref_x, ref_y, other_x, other_y [m].
+    x points along the motion at the opening, y to the left (paper, fig. 2).
+
+    Raises
+    ------
+    DataError : a table lacks a column or is empty, or a sample is not in `tracks`.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> import plots
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
+    >>> tracks = szlib.read_tracks(plaza)
+    >>> paths = plots.reference_frame(tracks, szlib.find_encounters(tracks))
+    >>> list(paths.columns)
+    ['encounter', 't', 'ref_x', 'ref_y', 'other_x', 'other_y']
+    """
+    ref, oth = match_rows(tracks, samples)
+    opening = ref.groupby("encounter")["tick"].transform("idxmin").to_numpy()
+    x, y, vx, vy = (ref[name].to_numpy()[opening] for name in ("x", "y", "vx", "vy"))
+    cos, sin = np.cos(np.arctan2(vy, vx)), np.sin(np.arctan2(vy, vx))
+    out = {"encounter": samples["encounter"].to_numpy(), "t": samples["t"].to_numpy()}
+    for person, rows in (("ref", ref), ("other", oth)):
+        dx, dy = rows["x"].to_numpy() - x, rows["y"].to_numpy() - y
+        out |= {f"{person}_x": cos * dx + sin * dy, f"{person}_y": cos * dy - sin * dx}
+    return pd.DataFrame(out)
+
+
+def match_rows(tracks: pd.DataFrame, samples: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows of `tracks` of the reference pedestrian and of the other person, for each of `samples`.
+
+    Both tables have the columns encounter, tick, x, y [m], vx, vy [m/s], in the order of the samples.  Raises
+    DataError as `reference_frame`.
+    """
+    check_columns(tracks, COLUMNS)
+    check_columns(samples, SAMPLE_COLUMNS[:5])
+    people = tracks[tracks["id"].isin(samples["ref_id"]) | tracks["id"].isin(samples["other_id"])]
+    people = people[["day", "id", "x", "y", "vx", "vy"]].assign(
+        tick=nearest_tick(people["t"].to_numpy(float))
+    )
+    keys = samples[["encounter", "day", "ref_id", "other_id"]].assign(
+        tick=nearest_tick(samples["t"].to_numpy(float))
+    )
+    ref, oth = (
+        keys.merge(
+            people,
+            how="left",
+            left_on=["day", column, "tick"],
+            right_on=["day", "id", "tick"],
+        )
+        for column in ("ref_id", "other_id")
+    )
+    is_known = ref["x"].notna() & oth["x"].notna()
+    expected = "this sample is not in these tracks; pass the tracks it was found in"
+    check_rows(samples, is_known, SAMPLE_COLUMNS[:5], expected)
+    return ref, oth
+
+
 def plot_encounter_paths(paths: pd.DataFrame, *, n_shown: int = 200, ax: Axes | None = None) -> Axes:
     """Plot the paths of both people in the reference pedestrian's first frame (paper, fig. 2).
 
@@ -52,7 +124,7 @@ def plot_encounter_paths(paths: pd.DataFrame, *, n_shown: int = 200, ax: Axes | 
 
     Parameters
     ----------
-    paths : table as from `szlib.encounters.reference_frame`.
+    paths : table as from `reference_frame`.
     n_shown : number of encounters to draw, evenly spread over all.
     ax : axes to draw on; None makes new ones.
 

@@ -27,11 +27,9 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from ..core.checks import check_columns, check_rows
 from ..core.errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND
-from .areas import as_area
 from .occupants import TrackRows
 
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
@@ -50,58 +48,6 @@ EQUAL_VELOCITY, EQUAL_SHARE = 0.4, 0.5
 WALKING = 0.4
 # Directions at most this far apart [rad] are the same, from pi less this on opposite (assumed).
 ALONG = np.pi / 4
-
-
-def encounter_kinds(
-    tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object = None
-) -> pd.Categorical:
-    """Decide the kind of each pair of people, one of `KINDS`.
-
-    Parameters
-    ----------
-    tracks : a track table as from `szlib.read_tracks` (any row order).
-    pairs : a table with columns day, ref_id, other_id (such as samples of encounters), any order.
-    area : as in `szlib.find_encounters`; None takes the whole tracks.
-
-    Returns
-    -------
-    A kind for each row of `pairs`; missing where the two people were never there at the same time.
-
-    Raises
-    ------
-    DataError : a column is missing, or a person is not in `tracks`.
-
-    Examples
-    --------
-    >>> import numpy as np, pandas as pd, szlib
-    >>> t = np.arange(0, 8, 0.1).round(1)
-    >>> left = pd.DataFrame({"day": "a", "id": 1, "t": t, "x": t, "y": 0.0, "vx": 1.0, "vy": 0.0})
-    >>> tracks = pd.concat([left, left.assign(id=2, y=1.0)])
-    >>> pairs = pd.DataFrame({"day": ["a"], "ref_id": [1], "other_id": [2]})
-    >>> list(szlib.encounter_kinds(tracks, pairs))
-    ['companions']
-    """
-    check_columns(pairs, ["day", "ref_id", "other_id"])
-    rows = TrackRows.from_tracks(tracks)
-    people = tracks.iloc[rows.order[np.flatnonzero(np.diff(rows.person, prepend=-1))]]
-    known = pd.MultiIndex.from_arrays([people["day"].astype(str), people["id"]])
-    ref, other = (
-        known.get_indexer(
-            pd.MultiIndex.from_arrays([pairs["day"].astype(str), pairs[column]])
-        )
-        for column in ("ref_id", "other_id")
-    )
-    expected = "not in these tracks; pass the tracks in which the pairs were found"
-    check_rows(
-        pairs, (ref >= 0) & (other >= 0), ["day", "ref_id", "other_id"], expected
-    )
-    everywhere = np.ones(len(rows), bool)
-    counts = (
-        everywhere
-        if area is None
-        else as_area(area).grown(REACH).contains(rows.x, rows.y)
-    )
-    return kinds_of_pairs(ref, other, rows, counts)
 
 
 def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.DataFrame:
@@ -162,31 +108,42 @@ def kinds_of_pairs(
     pair, a, b = _common_track(pairs, rows.person, rows.tick, counts)
     apart = np.hypot(rows.x[a] - rows.x[b], rows.y[a] - rows.y[b])
     relative = np.hypot(rows.vx[a] - rows.vx[b], rows.vy[a] - rows.vy[b])
+    ticks, near, equal = (
+        np.bincount(pair, each, minlength=len(pairs))
+        for each in (np.ones(len(pair)), apart <= NEAR, relative <= EQUAL_VELOCITY)
+    )
+    together = ticks >= TOGETHER * TICKS_PER_SECOND
+    together &= (near >= NEAR_SHARE * ticks) & (equal >= EQUAL_SHARE * ticks)
+    codes = classify_motion(rows, a, b, pair, len(pairs))
+    codes = np.select([ticks == 0, together], [-1, KINDS.index(COMPANIONS)], codes)
+    return pd.Categorical(
+        np.array([*KINDS, None])[codes[index.ravel()]], categories=list(KINDS)
+    )
+
+
+def classify_motion(
+    rows: TrackRows, a: np.ndarray, b: np.ndarray, pair: np.ndarray, n: int
+) -> np.ndarray:
+    """Decide how the two people of each of `n` pairs move: numbers of `KINDS`, companions left aside.
+
+    `a` and `b` are the `rows` of the two at every moment that counts, and `pair` the number of their pair.
+    """
     (ax, ay), (bx, by) = (
         np.nan_to_num([rows.vx[each], rows.vy[each]]) for each in (a, b)
     )
 
     def over_time(values: np.ndarray) -> np.ndarray:
-        """Sum of the `values` of each pair over its common track."""
-        return np.bincount(pair, weights=values, minlength=len(pairs))
+        """Sum of the `values` of each pair."""
+        return np.bincount(pair, weights=values, minlength=n)
 
-    ticks = over_time(np.ones(len(pair)))
-    together = ticks >= TOGETHER * TICKS_PER_SECOND
-    together &= over_time(apart <= NEAR) >= NEAR_SHARE * ticks
-    together &= over_time(relative <= EQUAL_VELOCITY) >= EQUAL_SHARE * ticks
-    stands = (
-        np.maximum(*(over_time(rows.speed[each] < WALKING) for each in (a, b)))
-        > ticks / 2
-    )
+    slow = np.maximum(*(over_time(rows.speed[each] < WALKING) for each in (a, b)))
+    stands = slow > over_time(np.ones(len(pair))) / 2
     angle = np.abs(
         np.arctan2(over_time(ax * by - ay * bx), over_time(ax * bx + ay * by))
     )
-    rules = [ticks == 0, together, stands, angle <= ALONG, angle >= np.pi - ALONG]
-    found = [-1, *map(KINDS.index, (COMPANIONS, STANDING, SAME, OPPOSITE))]
-    codes = np.select(rules, found, KINDS.index(CROSSING)).astype(np.int8)
-    return pd.Categorical(
-        np.array([*KINDS, None])[codes[index.ravel()]], categories=list(KINDS)
-    )
+    found = [KINDS.index(kind) for kind in (STANDING, SAME, OPPOSITE, CROSSING)]
+    rules = [stands, angle <= ALONG, angle >= np.pi - ALONG]
+    return np.select(rules, found[:3], found[3]).astype(np.int8)
 
 
 def _common_track(

@@ -1,13 +1,34 @@
 """The rows of a track table, or of a file, that encounters in an area can depend on.
 
 `select_near_rows` takes them from a track table (one row in six of a mall's day), `read_near_area` from a
-file.  `szlib.find_encounters` finds the same encounters in them as in all rows.
+file.  `szlib.find_encounters` finds the same encounters in them as in all rows, bit for bit.
+
+A raw file is read block by block.  The proof uses these terms: g is the longest gap [s] within a track; 0.1 s
+is the step of the clock; "the square" is the smallest one around the area, grown by the 5 m in which kinds of
+encounter are decided.
+
+1. Time is cut into cells of w > g seconds for each person.  Only whole cells are dropped.  Take two selected
+   rows that follow each other among the selected ones, at most g apart.  No dropped row lies between them,
+   because a dropped cell between them would be longer than g.  So `to_clock` interpolates between the same
+   two rows as in the whole day: no tick is new, and no tick has moved.
+2. A tick inside the square lies between two rows at most g apart, in one cell or in two successive cells.
+   If all rows of both cells were on the outer side of one of the square's four edges, the tick would be
+   too.  So a tick can be inside only where this holds for no edge.  No speed is assumed.
+3. Of the rows outside the square `find_encounters` uses only these: the rows of a person who is inside, from
+   0.5 s before (velocity of the reference pedestrian) to the end of the window of 3 s after (both people
+   are tracked, and the other person is sampled), and g further to interpolate.  All cells within this reach
+   of a cell that can have a tick inside are selected.  (Kinds need only ticks inside and their velocities.)
+
+One pass over a file sorted by time, as ATC's are, is enough, because a cell depends only on a few later ones.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +46,19 @@ from ..tracks.readers import (
     order_by_person,
     read_raw,
     read_stage,
+    reject_rows,
     with_days,
 )
 from ..tracks.recipe import Recipe, find_recipe
 from ..tracks.recordings import LoadedFile
-from .blocks import UsableBlocks
-from .cells import Cells, UnsortedError, select_near
-from .geometry import Area
+from .geometry import Area, Square
 from .kinds import REACH
 from .occupants import TrackRows
 
+NUMBERS = ("t", "id", "x", "y")  # columns of a block: t [s], id, x, y [m]
+_BLOCK_ROWS = 1 << 17  # of one block [about 5 minutes of a raw day]
+# larger than every rounding error of a time [s], position [m]
+_TIME_ROUNDING, _POSITION_ROUNDING = (0.1, 1e-6)
 _ROW_BYTES = 180  # memory of a row near the area until its day is done (15.6 million of them: 2.7 GB)
 
 
@@ -73,6 +97,108 @@ def is_near(
     )
 
 
+class UnsortedError(Exception):
+    """The rows are not sorted by time."""
+
+
+@dataclass
+class UsableBlocks:
+    """The usable rows of a scan, block by block, in the order of the file.
+
+    Attributes
+    ----------
+    scan : scan of the file.
+    n_usable : number of usable rows so far.
+    farthest : their largest absolute coordinate [m].
+    reasons : number of the other rows by reason.
+    first_fault : line and reason of the first of them.
+    """
+
+    scan: pl.LazyFrame
+    n_usable: int = 0
+    farthest: float = 0.0
+    reasons: Counter[str] = field(default_factory=Counter)
+    first_fault: tuple[int, str] | None = None
+
+    def __iter__(self) -> Iterator[pl.DataFrame]:
+        read = 0  # line numbers of the scan take long
+        columns = self.scan.select("ragged", "exact_id", *NUMBERS)
+        for block in columns.collect_batches(
+            chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"
+        ):
+            lines = block.with_row_index("line", offset=read + 1)
+            good, reasons, first = reject_rows(lines)
+            read += block.height
+            self.reasons.update(reasons)
+            self.first_fault = self.first_fault or first
+            if good.height:
+                self.n_usable += good.height
+                self.farthest = max(
+                    self.farthest, *good.select(pl.col("x", "y").abs().max()).row(0)
+                )
+                yield good.select(NUMBERS)
+
+
+def reach_in_cells(duration: float, max_gap: float) -> tuple[float, int, int]:
+    """Length w of a cell [s], and how many cells before and after one with a tick inside are needed."""
+    width = max_gap + _TIME_ROUNDING
+    spans = (VELOCITY_SPAN, max(duration, VELOCITY_SPAN))
+    before, after = (ceil((span + width) / width) for span in spans)
+    return width, before, after
+
+
+def select_near(
+    blocks: Iterable[pl.DataFrame], square: Square, duration: float, max_gap: float
+) -> Iterator[pl.DataFrame]:
+    """Yield the needed rows of `blocks` sorted by time; else raise UnsortedError.
+
+    `square` is the smallest one around the area, grown by `REACH`; `duration` [s] is that of a window, and
+    `max_gap` [s] the longest gap within a track.
+    """
+    width, before, after = reach_in_cells(duration, max_gap)
+    cell = (pl.col("t") / width).floor().cast(pl.Int64).alias("cell")
+    waiting = pl.DataFrame(schema=dict.fromkeys(NUMBERS, pl.Float64) | {"id": pl.Int64})
+    waiting = waiting.with_columns(cell)
+    decided = newest = np.iinfo(np.int64).min // 2
+    for block in blocks:
+        block = block.with_columns(cell)
+        if int(block["cell"].to_numpy().min()) < newest:
+            raise UnsortedError
+        newest = int(block["cell"].to_numpy().max())
+        known = pl.concat([waiting, block], rechunk=True)
+        complete = newest - before - 2
+        chosen = pl.col("cell").is_between(decided + 1, complete)
+        yield _needed(known, square, before, after).filter(chosen).select(NUMBERS)
+        decided = max(decided, complete)
+        waiting = known.filter(pl.col("cell") >= decided - after)
+    rest = _needed(waiting, square, before, after).filter(pl.col("cell") > decided)
+    yield rest.select(NUMBERS)
+
+
+def _needed(
+    rows: pl.DataFrame, square: Square, before: int, after: int
+) -> pl.DataFrame:
+    """The `rows` in cells that are needed."""
+    (x0, x1), (y0, y1) = (
+        square.grown(_POSITION_ROUNDING).x,
+        square.grown(_POSITION_ROUNDING).y,
+    )
+    x, y = pl.col("x"), pl.col("y")
+    inner = {"a": x >= x0, "b": x <= x1, "c": y >= y0, "d": y <= y1}
+    sides = rows.select("id", "cell", **inner)
+    earlier = sides.with_columns(pl.col("cell") - 1)
+    both = pl.concat([sides, earlier]).group_by("id", "cell").agg(pl.all().any())
+    inside = both.filter(pl.all_horizontal(*inner)).select("id", "cell")
+    reach = [
+        inside.with_columns(pl.col("cell") + step)
+        for step in range(
+            -before, after + 2
+        )  # the tick may be in the pair's second cell
+    ]
+    needed = pl.concat(reach).unique()
+    return rows.join(needed, on=["id", "cell"], how="semi", maintain_order="left")
+
+
 def read_near_area(
     paths: str | Path | Sequence[Path],
     *,
@@ -107,9 +233,9 @@ def read_near_area(
         and is_streamed(path, recipe)
     ):
         with open_file(path, recipe) as (found, scan), suppress(UnsortedError):
-            cells = Cells(area.grown(REACH).box, duration, found.max_gap or 0.0, 1.0)
-            blocks, parts, n_near = UsableBlocks(scan), [], 0
-            for rows in select_near(cells, blocks):
+            square, blocks = area.grown(REACH).box, UsableBlocks(scan)
+            parts, n_near = [], 0
+            for rows in select_near(blocks, square, duration, found.max_gap or 0.0):
                 parts.append(rows)
                 n_near += rows.height
                 memory.require(

@@ -1,7 +1,8 @@
-"""The null model: encounters of people who do not interact.
+"""The null model: encounters, or pairs, of people who do not interact.
 
 Where people are rarely near each other, is that respect, or is the place merely empty?  `null_encounters`
-finds the encounters of many `time_shifted` days, to compare with those of the data.
+finds the encounters of many `time_shifted` days, to compare with those of the data. `null_pairs` does so for
+every pair of people; there streams are moved as a whole.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from ..core.checks import require
 from ..core.parallel import run_tasks
 from ..tracks import funnels
 from .finding import find_encounters, find_place
-from .kinds import of_kind
+from .kinds import KINDS, of_kind
+from .pairs import CLOSE, COMPARED, Crowd, name_kinds
+from .samples import sample_rows
 from .sensors import SensorCheck
 from .settings import EncounterSettings
-from .time_shift import ShiftableTracks
-
-CLOSE = 2.0  # samples farther away [m] do not belong to a zone (paper: r_max)
+from .time_shift import MINUTES, ShiftableTracks
 
 _TASK_SHIFTS = 5  # shifts of one task
+_STORED = 12_000  # pairs whose samples are stored, over all shifts
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,7 @@ class NullEncounters:
     shifts : number of null models.
     r_max : distance up to which samples are stored [m].
     parameters : parameters of `null_encounters` or `null_pairs` that made it (JSON values).
-    sensor : what the data says about the sensor; None: not looked at.
+    sensor : what the ends of tracks say about the sensor; None: not looked at.
 
     Examples
     --------
@@ -129,6 +131,7 @@ def null_encounters(
     tracks, area = find_place(tracks, settings)
     settings = replace(settings, area=area)
     kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
+    sensor = Crowd.from_tracks(tracks, area).sensor
     everyone = ShiftableTracks.from_tracks(tracks)
     # an impossible shift raises its error here, not in a worker
     everyone.draw_shifts(seed, minutes)
@@ -157,7 +160,81 @@ def null_encounters(
         "grouped": grouped,
     }
     parameters = {**made_by, "kinds": kinds, **settings.as_json()}
-    return NullEncounters(*_concatenate(found), shifts, float(r_max), parameters)
+    return NullEncounters(
+        *_concatenate(found), shifts, float(r_max), parameters, sensor
+    )
+
+
+def null_pairs(
+    tracks: pd.DataFrame,
+    *,
+    area: object = None,
+    shifts: int = 99,
+    seed: int = 0,
+    minutes: tuple[float, float] = MINUTES,
+    r_max: float = CLOSE,
+    progress: bool = True,
+) -> NullEncounters:
+    """Find the pairs of people who do not interact: the same streams, each moved in time, many times.
+
+    Parameters
+    ----------
+    tracks, area, r_max : as in `find_pairs`, and the same as for the data.
+    shifts : number of null models.
+    seed : of the random shifts.
+    minutes : shortest and longest shift of a stream [min], forward or backward around the recording of a day;
+        in proportion in a recording shorter than their sum.
+    progress : whether to show a bar over the shifts.
+
+    Returns
+    -------
+    `szlib.NullEncounters` with the nearest approach of all pairs of the kinds compared, the samples of at
+    most 12,000 of them, drawn evenly from the shifts, and what the data says about the sensor (`sensor`).
+
+    Raises
+    ------
+    DataError : as `find_pairs`; or there is no shift, or a recording is too short.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
+    >>> null = szlib.null_pairs(szlib.read_tracks(plaza), shifts=2, progress=False)
+    >>> null.shifts, list(null.encounters.columns)
+    (2, ['encounter', 'shift', 'kind', 'nearest'])
+    """
+    require(shifts >= 1, "shifts", shifts, "at least 1")
+    require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
+    tracks, place = find_place(tracks, EncounterSettings(area=area))
+    crowd = Crowd.from_tracks(tracks, place)
+    rng, quota = np.random.default_rng(seed), -(-_STORED // shifts)
+    first, samples, encounters = 0, [], []
+    codes = [KINDS.index(kind) for kind in COMPARED]
+    for shift in tqdm(range(shifts), unit="shift", disable=None if progress else True):
+        met = crowd.meet(crowd.draw(rng, minutes), r_max, shifted=True)
+        counted = np.flatnonzero(np.isin(met.kind, codes))
+        stored = counted
+        if len(counted) > quota:
+            stored = np.sort(rng.choice(counted, quota, replace=False))
+        one, other, pair = crowd.sample(met, stored, r_max)
+        close = sample_rows(tracks, crowd.order[one], crowd.order[other])
+        close.insert(0, "encounter", pair + first)
+        kind = name_kinds(met.kind)
+        samples.append(close.assign(kind=kind[pair], shift=shift))
+        table = {"encounter": counted + first, "shift": shift, "kind": kind[counted]}
+        encounters.append(pd.DataFrame(table | {"nearest": met.nearest[counted]}))
+        first += len(met.pair)
+    parameters: dict[str, Any] = {"moved": "streams", "shifts": shifts, "seed": seed}
+    parameters |= {
+        "minutes": list(minutes),
+        "kinds": list(COMPARED),
+        "area": str(place),
+    }
+    parameters |= {"units": crowd.unit_sizes, "streams": len(crowd.streams)}
+    return NullEncounters(
+        pd.concat(samples, ignore_index=True), pd.concat(encounters, ignore_index=True), shifts, float(r_max),
+        parameters, crowd.sensor,
+    )  # fmt: skip
 
 
 def _find_shifted(

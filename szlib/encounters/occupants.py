@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,13 +9,9 @@ import pandas as pd
 
 from ..tracks.clock import clock_index
 from .geometry import AttentionalSpace
+from .neighbours import find_neighbours
 
-# pairs of people held in memory at a time: they fit into a cache
-_PAIRS_AT_ONCE = 250_000
-# larger than every rounding error of a position, for any number of ticks [m]
-_ROUNDING = 1e-3
-
-Range = tuple[np.ndarray, np.ndarray]  # low and high end, for each row
+_ROUNDING = 1e-3  # larger than every rounding error of a position [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +66,12 @@ class TrackRows:
             np.arctan2(vy, vx),
         )
 
+    @property
+    def moment(self) -> np.ndarray:
+        """Number of the moment, a tick of a day, of each row."""
+        tick = self.tick - self.tick.min()
+        return np.asarray(self.day * (np.int64(tick.max()) + 1) + tick)
+
     def __len__(self) -> int:
         return len(self.x)
 
@@ -89,15 +90,16 @@ def find_occupants(
     """
     found = [(np.empty(0, np.intp),) * 2]
     cosines, sines = np.cos(rows.heading), np.sin(rows.heading)
-    ahead, side = space.corners.T[..., None]
-    x, y = ahead * cosines - side * sines, ahead * sines + side * cosines
-    for ref, oth in _simultaneous(
-        rows, inside, ready, (x.min(0), x.max(0)), (y.min(0), y.max(0))
-    ):
-        dx, dy = rows.x[oth] - rows.x[ref], rows.y[oth] - rows.y[ref]
-        cos, sin = cosines[ref], sines[ref]
-        within = space.contains(cos * dx + sin * dy, cos * dy - sin * dx) & (ref != oth)
-        found.append((ref[within], oth[within]))
+    reach = float(np.hypot(*space.corners.T).max()) + _ROUNDING
+    places = rows.x[inside], rows.y[inside], rows.moment[inside]
+    for pair in find_neighbours(*places, reach):
+        for ref, oth in (pair, pair[::-1]):
+            looks = ready[inside[ref]]
+            ref, oth = inside[ref[looks]], inside[oth[looks]]
+            dx, dy = rows.x[oth] - rows.x[ref], rows.y[oth] - rows.y[ref]
+            cos, sin = cosines[ref], sines[ref]
+            within = space.contains(cos * dx + sin * dy, cos * dy - sin * dx)
+            found.append((ref[within], oth[within]))
     ref, oth = map(np.concatenate, zip(*found, strict=True))
     other = np.full(len(rows), -1)
     other[ref] = oth
@@ -116,47 +118,3 @@ def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.
         person[1:] != person[:-1]
     )
     return changed
-
-
-def _simultaneous(
-    rows: TrackRows,
-    inside: np.ndarray,
-    ready: np.ndarray,
-    along_x: Range,
-    along_y: Range,
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield blocks of pairs (ready row, row inside the area) that share a tick.
-
-    Pairs are left out that are outside the range of the space of the first along x or y: smallest and largest
-    difference of each of the `rows` [m].  In a hall these are most pairs.
-    """
-    if len(inside) == 0:
-        return
-    at = inside[np.lexsort((rows.y[inside], rows.tick[inside], rows.day[inside]))]
-    new_tick = np.r_[True, (np.diff(rows.tick[at]) != 0) | (np.diff(rows.day[at]) != 0)]
-    x, (low_x, high_x), (low_y, high_y) = rows.x, along_x, along_y
-    ready_rows = np.flatnonzero(ready[at])
-    low, high = low_y[at[ready_rows]] - _ROUNDING, high_y[at[ready_rows]] + _ROUNDING
-    beyond = max(-low.min(initial=0), high.max(initial=0))
-    place = rows.y[at] - rows.y[at].min()
-    # ticks lie out of reach of each other
-    place += (np.cumsum(new_tick) - 1) * (place.max() + 2 * beyond)
-    first = np.searchsorted(place, place[ready_rows] + low)
-    count = np.searchsorted(place, place[ready_rows] + high, side="right") - first
-    block = np.cumsum(count) // _PAIRS_AT_ONCE
-    for chosen in map(
-        slice,
-        starts := np.flatnonzero(np.diff(block, prepend=-1)),
-        [*starts[1:], len(block)],
-    ):
-        size = count[chosen]
-        offset = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
-        one, other = (
-            np.repeat(at[ready_rows[chosen]], size),
-            at[np.repeat(first[chosen], size) + offset],
-        )
-        difference = x[other] - x[one]
-        near = (difference >= low_x[one] - _ROUNDING) & (
-            difference <= high_x[one] + _ROUNDING
-        )
-        yield one[near], other[near]

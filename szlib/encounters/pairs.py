@@ -16,16 +16,14 @@ Compared are pairs of different streams who come towards each other or cross.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from tqdm import tqdm
 
 from ..core.checks import require
 from ..core.errors import DataError
@@ -34,7 +32,6 @@ from ..tracks.clock import TICKS_PER_SECOND
 from .finding import find_place
 from .geometry import Area
 from .kinds import (
-    ALONG,
     COMPANIONS,
     CROSSING,
     KINDS,
@@ -44,20 +41,22 @@ from .kinds import (
     SAME,
     STANDING,
     TOGETHER,
-    WALKING,
+    classify_motion,
     kinds_of_pairs,
     of_kind,
 )
-from .null_model import CLOSE, NullEncounters
+from .neighbours import find_neighbours
 from .occupants import TrackRows
 from .samples import sample_rows
 from .sensors import SensorCheck, check_sensor
 from .settings import EncounterSettings
-from .time_shift import MINUTES
+
+CLOSE = 2.0  # people farther apart [m] do not belong to a zone (paper: r_max)
 
 COMPARED = (OPPOSITE, CROSSING)
 """Kinds of pairs that a shift in time can tell about."""
 
+_STANDING = KINDS.index(STANDING)
 _SECTORS = 8  # streams by direction of travel
 _OFFSETS = np.radians(np.arange(0, 45, 5))  # of the borders of the sectors
 _MARGIN = 1.75  # way that two people close in half a second, at 3.5 m/s [m]
@@ -66,8 +65,6 @@ _AROUND = np.arange(-TICKS_PER_SECOND, TICKS_PER_SECOND + 1)
 _BEYOND = (
     1.6  # people this far outside of the area may be in it at the next whole second [m]
 )
-_AT_ONCE = 2_000_000  # pairs of rows held in memory at a time
-_STORED = 12_000  # pairs of the null model whose samples are stored, over all shifts
 _SHORTEST = 10.0  # shortest shift [s]: longer than two people see each other
 
 
@@ -113,83 +110,11 @@ def find_pairs(
     one, other, pair = crowd.sample(met, np.arange(len(met.pair)), r_max)
     samples = sample_rows(tracks, crowd.order[one], crowd.order[other])
     samples.insert(0, "encounter", pair)
-    samples["kind"] = _name_kinds(met.kind[pair])
+    samples["kind"] = name_kinds(met.kind[pair])
     samples["third"] = met.third[pair]
     samples.attrs |= {"area": str(place), "area_reason": place.reason}
     stage = funnels.stage("pairs: samples", len(samples), len(samples), {})
     return of_kind(funnels.attach(samples, [*funnels.get(tracks), stage]), kinds)
-
-
-def null_pairs(
-    tracks: pd.DataFrame,
-    *,
-    area: object = None,
-    shifts: int = 99,
-    seed: int = 0,
-    minutes: tuple[float, float] = MINUTES,
-    r_max: float = CLOSE,
-    progress: bool = True,
-) -> NullEncounters:
-    """Find the pairs of people who do not interact: the same streams, each moved in time, many times.
-
-    Parameters
-    ----------
-    tracks, area, r_max : as in `find_pairs`, and the same as for the data.
-    shifts : number of null models.
-    seed : of the random shifts.
-    minutes : shortest and longest shift of a stream [min], forward or backward around the recording of a day;
-        in proportion in a recording shorter than their sum.
-    progress : whether to show a bar over the shifts.
-
-    Returns
-    -------
-    `szlib.NullEncounters` with the nearest approach of all pairs of the kinds compared, the samples of at
-    most 12,000 of them, drawn evenly from the shifts, and what the data says about the sensor (`sensor`).
-
-    Raises
-    ------
-    DataError : as `find_pairs`; or there is no shift, or a recording is too short.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
-    >>> null = szlib.null_pairs(szlib.read_tracks(plaza), shifts=2, progress=False)
-    >>> null.shifts, list(null.encounters.columns)
-    (2, ['encounter', 'shift', 'kind', 'nearest'])
-    """
-    require(shifts >= 1, "shifts", shifts, "at least 1")
-    require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
-    tracks, place = find_place(tracks, EncounterSettings(area=area))
-    crowd = Crowd.from_tracks(tracks, place)
-    rng, quota = np.random.default_rng(seed), -(-_STORED // shifts)
-    first, samples, encounters = 0, [], []
-    codes = [KINDS.index(kind) for kind in COMPARED]
-    for shift in tqdm(range(shifts), unit="shift", disable=None if progress else True):
-        met = crowd.meet(crowd.draw(rng, minutes), r_max, shifted=True)
-        counted = np.flatnonzero(np.isin(met.kind, codes))
-        stored = counted
-        if len(counted) > quota:
-            stored = np.sort(rng.choice(counted, quota, replace=False))
-        one, other, pair = crowd.sample(met, stored, r_max)
-        close = sample_rows(tracks, crowd.order[one], crowd.order[other])
-        close.insert(0, "encounter", pair + first)
-        kind = _name_kinds(met.kind)
-        samples.append(close.assign(kind=kind[pair], shift=shift))
-        table = {"encounter": counted + first, "shift": shift, "kind": kind[counted]}
-        encounters.append(pd.DataFrame(table | {"nearest": met.nearest[counted]}))
-        first += len(met.pair)
-    parameters: dict[str, Any] = {"moved": "streams", "shifts": shifts, "seed": seed}
-    parameters |= {
-        "minutes": list(minutes),
-        "kinds": list(COMPARED),
-        "area": str(place),
-    }
-    parameters |= {"units": crowd.unit_sizes, "streams": len(crowd.streams)}
-    return NullEncounters(
-        pd.concat(samples, ignore_index=True), pd.concat(encounters, ignore_index=True), shifts, float(r_max),
-        parameters, crowd.sensor,
-    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +195,7 @@ class Crowd:
     def unit(self) -> np.ndarray:
         """Number of the unit of each person: companions, and companions of companions."""
         n = self.rows.person[-1] + 1
-        one, other, _ = self._near_rows(self.second, NEAR, np.zeros(n, np.int64))
+        one, other = self._near_rows(self.second, NEAR, np.arange(n))
         person = self.rows.person[self.coarse]
         pairs = np.sort(np.column_stack([person[one], person[other]]), axis=1)
         pairs, seconds = np.unique(pairs, axis=0, return_counts=True)
@@ -348,7 +273,7 @@ class Crowd:
         person, day = rows.person[coarse], rows.day[coarse]
         second = (self.second + shifts[self.stream[person]]) % self.days[1][day]
         stream = self.stream if shifted else np.arange(len(self.stream))
-        one, other, _ = self._near_rows(second, r_max + _MARGIN, stream)
+        one, other = self._near_rows(second, r_max + _MARGIN, stream)
         swap = person[one] > person[other]
         one, other = np.where(swap, other, one), np.where(swap, one, other)
         key = person[one] * np.int64(len(self.stream)) + person[other]
@@ -384,26 +309,16 @@ class Crowd:
 
     def _near_rows(
         self, second: np.ndarray, reach: float, group: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of coarse rows of two people of different groups in one `second`, within `reach` [m]."""
-        coarse = self.coarse
-        x, y = self.rows.x[coarse], self.rows.y[coarse]
-        own = group[self.rows.person[coarse]]
-        if not group.any():
-            own = self.rows.person[coarse]
-        ix, iy = ((v - v.min()) // reach for v in (x, y))
-        ny, nx = int(iy.max(initial=0)) + 3, int(ix.max(initial=0)) + 2
-        moment = self.rows.day[coarse] * np.int64(self.days[1].max()) + second
-        key = (moment * nx + ix.astype(np.int64)) * ny + iy.astype(np.int64)
-        order = np.argsort(key)
-        key, x, y, own = key[order], x[order], y[order], own[order]
-        found = [(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0))]
-        for one, other in _candidates(key, ny):
-            distance = np.hypot(x[one] - x[other], y[one] - y[other])
-            near = (distance < reach) & (own[one] != own[other])
-            found.append((order[one[near]], order[other[near]], distance[near]))
-        one, other, distance = map(np.concatenate, zip(*found, strict=True))
-        return one, other, distance
+        rows, own = self.rows.select(self.coarse), group[self.rows.person[self.coarse]]
+        moment = rows.day * self.days[1].max() + second
+        found = [(np.empty(0, np.intp), np.empty(0, np.intp))]
+        for one, other in find_neighbours(rows.x, rows.y, moment, reach):
+            differ = own[one] != own[other]
+            found.append((one[differ], other[differ]))
+        one, other = map(np.concatenate, zip(*found, strict=True))
+        return one, other
 
     def _along(
         self, one: np.ndarray, other: np.ndarray, steps: np.ndarray
@@ -443,23 +358,13 @@ class Crowd:
     ) -> np.ndarray:
         """Number of the kind of each pair, from its coarse rows."""
         rows, a, b = self.rows, self.coarse[one], self.coarse[other]
-
-        def mean(values: np.ndarray) -> np.ndarray:
-            """Mean of the `values` of each pair."""
-            return np.bincount(of_pair, values, minlength=n) / np.bincount(
-                of_pair, minlength=n
-            )
-
-        cross = mean(rows.vx[a] * rows.vy[b] - rows.vy[a] * rows.vx[b])
-        dot = mean(rows.vx[a] * rows.vx[b] + rows.vy[a] * rows.vy[b])
-        angle = np.abs(np.arctan2(cross, dot))
-        slow = np.maximum(*(mean(rows.speed[each] < WALKING) for each in (a, b)))
+        codes = classify_motion(rows, a, b, of_pair, n)
         start = np.flatnonzero(np.diff(of_pair, prepend=-1))
         p, q = rows.person[a[start]], rows.person[b[start]]
-        same = (self.stream[p] == self.stream[q]) | (angle <= ALONG)
-        rules = [self.unit[p] == self.unit[q], slow > 0.5, same, angle >= np.pi - ALONG]
-        names = [KINDS.index(kind) for kind in (COMPANIONS, STANDING, SAME, OPPOSITE)]
-        return np.select(rules, names, KINDS.index(CROSSING)).astype(np.int8)
+        same_stream = (self.stream[p] == self.stream[q]) & (codes != _STANDING)
+        rules = [self.unit[p] == self.unit[q], same_stream]
+        names = [KINDS.index(kind) for kind in (COMPANIONS, SAME)]
+        return np.select(rules, names, codes).astype(np.int8)
 
     def _third_people(
         self, one: np.ndarray, other: np.ndarray, at: np.ndarray, r_max: float
@@ -472,26 +377,6 @@ class Crowd:
         return np.asarray(np.maximum(most - 1, 0))
 
 
-def _name_kinds(codes: np.ndarray) -> pd.Categorical:
+def name_kinds(codes: np.ndarray) -> pd.Categorical:
     """The kinds with these numbers."""
     return pd.Categorical(np.array(KINDS)[codes], categories=list(KINDS))
-
-
-def _candidates(key: np.ndarray, ny: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pairs of rows in the same or neighbouring cells, each once; `key` is sorted."""
-    row = np.arange(len(key))
-    ranges = [
-        (row + 1, np.searchsorted(key, key + 1, side="right")),
-        (
-            np.searchsorted(key, key + ny - 1),
-            np.searchsorted(key, key + ny + 1, side="right"),
-        ),
-    ]
-    for low, high in ranges:
-        count = np.maximum(high - low, 0)
-        ends = np.cumsum(count)
-        cuts = np.searchsorted(ends, np.arange(_AT_ONCE, ends.max(initial=0), _AT_ONCE))
-        for start, end in zip(np.r_[0, cuts], np.r_[cuts, len(key)], strict=True):
-            n = count[start:end]
-            one = np.repeat(row[start:end], n)
-            yield one, np.arange(n.sum()) - np.repeat(np.cumsum(n) - n, n) + low[one]

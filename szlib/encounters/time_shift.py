@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import cKDTree
 
 from ..core.checks import require
 from ..core.errors import DataError
@@ -28,6 +27,7 @@ from ..tracks.clock import TICKS_PER_SECOND, compute_velocities
 from .geometry import Area
 from .kinds import NEAR, TOGETHER
 from .near_rows import is_near
+from .neighbours import find_neighbours
 from .occupants import TrackRows
 
 # Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed).  A
@@ -208,14 +208,9 @@ class ShiftableTracks:
 
 def _companions(rows: TrackRows) -> np.ndarray:
     """Pairs of people who were within `NEAR` [m] of each other for `TOGETHER` [s] or more; (n, 2)."""
-    whole = np.flatnonzero(rows.tick % TICKS_PER_SECOND == 0)
-    moments = np.column_stack([rows.day, rows.tick])[whole]
-    moment = np.unique(moments, axis=0, return_inverse=True)[1].ravel()
-    # two moments are never near
-    points = np.column_stack([rows.x[whole], rows.y[whole], 2 * NEAR * moment])
-    pairs = np.sort(
-        rows.person[whole][cKDTree(points).query_pairs(NEAR, output_type="ndarray")],
-        axis=1,
-    )
+    whole = rows.tick % TICKS_PER_SECOND == 0
+    found = find_neighbours(rows.x[whole], rows.y[whole], rows.moment[whole], NEAR)
+    near = [np.empty((2, 0), np.intp), *map(np.stack, found)]
+    pairs = np.sort(rows.person[whole][np.concatenate(near, axis=1).T], axis=1)
     pairs, seconds = np.unique(pairs, axis=0, return_counts=True)
     return np.asarray(pairs[seconds >= TOGETHER])

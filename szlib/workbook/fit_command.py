@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
+
 from ..control.settings import MPCSettings
 from ..core.errors import DataError, DataWarning, StorageError, ZoneError
 from ..core.files import folder_purpose, write_file
@@ -30,7 +32,6 @@ from ..zones.outliers import R_MAX
 from ..zones.social_zone import SocialZone
 from ..zones.uncertainty import N_RESAMPLES
 from ..zones.verdict import describe_missing_encounters
-from ..zones.zone_export import format_table
 from ..zones.zone_file import FORMAT
 from .folders import require_place
 from .record.data_cache import find_null_model
@@ -152,6 +153,23 @@ def fit(
             *notes,
             verdict,
         ]
+    )
+
+
+def format_table(zone: SocialZone) -> pd.DataFrame:
+    """The table of a `zone` as texts: semi-axes with their 95 % intervals, encounters, verdict."""
+    table = zone.table()
+    shown = pd.DataFrame({"speed [m/s]": table["speed"].map("{:g}".format)})
+    for name in ("a", "b"):
+        rows = table[[name, f"{name}_low", f"{name}_high"]].itertuples(index=False)
+        shown[f"{name} [m] (95 %)"] = [
+            f"{v:.2f} ({low:.2f} to {high:.2f})"
+            if high == high
+            else f"{v:.2f} (unknown)"
+            for v, low, high in rows
+        ]
+    return shown.assign(
+        encounters=table["encounters"].map("{:,.0f}".format), verdict=table["verdict"]
     )
 
 

@@ -9,8 +9,7 @@ hulls                 the zone outside the convex hull over (x', y', speed): est
 quantile              the zone that all but a share of encounters stay outside: estimator "quantile"
 respect               the ellipse that careful people keep out of, by the null model: estimator "respect"
 respect_likelihood    its likelihood, and the posterior of its parameters
-respect_profile       its radius from nearest approaches, all directions pooled, with an interval
-respect_significance  the test of the data against its null model
+respect_test          the test of the data against its null model, and the radius over all directions
 uncertainty           encounters by side, and confidence intervals by resampling people
 verdict               whether a zone can be used, and why not
 zone_file             the JSON file of a social zone

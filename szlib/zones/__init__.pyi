@@ -7,8 +7,7 @@ from .hulls import HullZone, hull_vertices, slice_hull
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
 from .reference_zones import ReferenceZone, reference_zone
-from .respect_profile import RespectRadius
-from .respect_significance import NullTest, null_test
+from .respect_test import NullTest, RespectRadius, null_test
 from .social_zone import SocialZone
 from .uncertainty import count_by_side
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..core.checks import Array
 from .ellipses import Ellipse
@@ -77,14 +77,3 @@ class Estimator(ABC):
     def describe_posterior(self) -> str:
         """How the posterior was drawn from; "" if there is none."""
         return ""
-
-    @abstractmethod
-    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
-        """Row numbers of the encounters that determine the zones at `speeds` [m/s] most."""
-
-    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
-        """The influential encounters (k,), and the ellipses (k, s, 5) at `speeds` without each of them."""
-        left_out = self.find_influential(speeds)
-        weights = np.ones((len(left_out), len(self.encounters)))
-        weights[np.arange(len(left_out)), left_out] = 0
-        return left_out, self.refit(weights, speeds)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -237,17 +237,14 @@ class HullEstimator(Estimator):
         r_max: float,
         fraction: float | None = None,
         n_neighbours: int | None = None,
-        speed_scale: float | None = None,
     ) -> HullEstimator:
         """Remove outliers from samples; parameters and errors as in `szlib.remove_outliers`.
 
         Parameters
         ----------
-        samples, r_max, fraction, n_neighbours, speed_scale : as in `szlib.remove_outliers`.
+        samples, r_max, fraction, n_neighbours : as in `szlib.remove_outliers`.
         """
-        options: dict[str, Any] = {
-            "fraction": fraction, "n_neighbours": n_neighbours, "speed_scale": speed_scale
-        }  # fmt: skip
+        options: dict[str, Any] = {"fraction": fraction, "n_neighbours": n_neighbours}
         inliers = remove_outliers(samples, r_max=r_max, **options)
         speed = inliers["speed"].to_numpy(float)
         points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
@@ -301,23 +298,6 @@ class HullEstimator(Estimator):
                     )
                     start[j] = np.flatnonzero(is_support).tolist()
         return ellipses
-
-    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
-        """Row numbers of the encounters with a vertex of the hull, for any `speeds`."""
-        return np.unique(self.number[_convex_hull(self.points).vertices])
-
-    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
-        """As `Estimator.leave_one_out` at `speeds`, with only the points that can become vertices.
-
-        These are the points of influential encounters, and the vertices of the hull of all other points.
-        """
-        of_influential = np.isin(self.number, self.find_influential(speeds))
-        rows = np.flatnonzero(of_influential)
-        with suppress(ZoneError):
-            rest = np.flatnonzero(~of_influential)
-            rows = np.union1d(rows, rest[_convex_hull(self.points[rest]).vertices])
-        shell = replace(self, points=self.points[rows], number=self.number[rows])
-        return Estimator.leave_one_out(shell, speeds)
 
 
 def _reach(along: Array, offsets: Array) -> Array:

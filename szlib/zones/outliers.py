@@ -124,7 +124,6 @@ def is_outlier(
     fraction: float | None = None,
     r_max: float = R_MAX,
     n_neighbours: int | None = None,
-    speed_scale: float | None = None,
 ) -> NDArray[np.bool_]:
     """Find the outliers among samples within r_max.
 
@@ -141,8 +140,6 @@ def is_outlier(
     r_max : longest distance [m].
     n_neighbours : number of neighbours of each encounter (None: a share of `NEIGHBOUR_SHARE`, at least
         `N_NEIGHBOURS`), or of each sample (None: `N_NEIGHBOURS`).
-    speed_scale : None compares (x', y'). A number compares (x', y', speed_scale * speed): the distance [m]
-        that corresponds to a difference of 1 m/s.
 
     Returns
     -------
@@ -169,7 +166,7 @@ def is_outlier(
     if fraction is None:
         nearest = nearest_approaches(samples)
         places, place = np.unique(
-            _features(nearest, r_max, speed_scale), axis=0, return_inverse=True
+            complementary_points(nearest, r_max=r_max), axis=0, return_inverse=True
         )
         is_far = _find_far(places, n_neighbours)[place.ravel()]
         return np.asarray(is_far[encounter_numbers(samples)[0]])
@@ -183,7 +180,7 @@ def is_outlier(
         return np.zeros(n_samples, bool)
     n_neighbours = N_NEIGHBOURS if n_neighbours is None else n_neighbours
     _check_neighbours(n_neighbours, n_samples)
-    points = _separate_copies(_features(samples, r_max, speed_scale), n_neighbours)
+    points = _separate_copies(complementary_points(samples, r_max=r_max), n_neighbours)
     factors, limit = _fit_factors(points, n_neighbours, fraction)
     return np.asarray(factors > limit)
 
@@ -194,7 +191,6 @@ def remove_outliers(
     fraction: float | None = None,
     r_max: float = R_MAX,
     n_neighbours: int | None = None,
-    speed_scale: float | None = None,
 ) -> pd.DataFrame:
     """Select the samples within r_max that are not outliers.
 
@@ -203,7 +199,7 @@ def remove_outliers(
     Parameters
     ----------
     samples : as from `szlib.find_encounters`.
-    fraction, r_max, n_neighbours, speed_scale : as in `szlib.zones.is_outlier`; so are warnings and errors.
+    fraction, r_max, n_neighbours : as in `szlib.zones.is_outlier`; so are warnings and errors.
 
     Examples
     --------
@@ -229,7 +225,6 @@ def remove_outliers(
         fraction=fraction,
         r_max=r_max,
         n_neighbours=n_neighbours,
-        speed_scale=speed_scale,
     )
     reason = (
         "outlier (LOF)" if fraction is not None else "of an outlying encounter (LOF)"
@@ -304,20 +299,3 @@ def _separate_copies(points: Array, n_neighbours: int) -> Array:
         3,
     )
     return points + np.random.default_rng(0).normal(0, JITTER, points.shape)
-
-
-def _features(samples: pd.DataFrame, r_max: float, speed_scale: float | None) -> Array:
-    """The coordinates of LOF: (x', y'), and the scaled speed if there is a scale; (n, 2) or (n, 3) [m]."""
-    points = complementary_points(samples, r_max=r_max)
-    if speed_scale is None:
-        return points
-    check_columns(samples, ["speed"])
-    speed = samples["speed"].to_numpy(float)
-    is_scale = 0 < speed_scale < np.inf
-    require(
-        is_scale, "speed_scale", speed_scale, "a positive number of m per m/s, or None"
-    )
-    check_rows(
-        samples, np.isfinite(speed), ["speed"], "expected a finite speed; drop the row"
-    )
-    return np.column_stack([points, speed_scale * speed])

@@ -33,7 +33,6 @@ SMOOTHING = 0.7
 
 _DEGREE = 2  # of the smoothing polynomial
 _TICK = 0.1  # time between samples [s]
-_MAX_LEFT_OUT = 50  # encounters that are left out one by one
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,16 +226,6 @@ class QuantileEstimator(Estimator):
         return fit_ellipses(fill_gaps(radii.reshape(-1, radii.shape[-1]))).reshape(
             *radii.shape[:2], 5
         )
-
-    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
-        """Row numbers of the encounters that enter the zones at `speeds` [m/s] in most directions."""
-        depth = np.zeros(len(self.encounters))
-        for speed in speeds:
-            encounters, nearest = self.approaches.nearest(speed)
-            depth[encounters] += (
-                nearest <= quantile_radii(self.approaches, speed, self.q)[0]
-            ).sum(axis=1)
-        return np.argsort(-depth, kind="stable")[:_MAX_LEFT_OUT]
 
 
 def _smoothing_matrix(length: int) -> Array:

@@ -37,7 +37,6 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from ..core.checks import Array
 from ..core.errors import ZoneError
@@ -58,7 +57,6 @@ _NULL_PER_ENCOUNTER = 2  # of the data
 _DATA_DRAWN = 4000  # encounters of the data that are used: with more, people differ from the model by more
 # Encounters of the data within r_max: with fewer the zone reaches as far as nobody was seen.
 MIN_COMPARED = 150
-_MAX_LEFT_OUT = 5
 # What the edge of people differs from that of the model: least standard deviation of the posterior of centre
 # (ahead, left), semi-axes [m] and angle (notebook 25, plazas of other seeds).
 _MODEL_ERROR = (0.05, 0.012, 0.05, 0.012, 0.0)
@@ -232,9 +230,3 @@ class RespectEstimator(Estimator):
         return np.asarray(
             mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)
         )
-
-    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
-        """Row numbers of the encounters deepest inside the zone, whatever the `speeds`."""
-        return np.argsort(self.data.distances(self.best)[0], kind="stable")[
-            :_MAX_LEFT_OUT
-        ]

@@ -32,7 +32,7 @@ from .hulls import HullEstimator, HullZone
 from .outliers import FRACTION, N_NEIGHBOURS, R_MAX, encounter_numbers
 from .quantile import QuantileEstimator
 from .respect import RespectEstimator
-from .respect_significance import NullTest, fit_null_radii, null_test
+from .respect_test import NullTest, null_test
 from .uncertainty import (
     N_RESAMPLES,
     QUANTITIES,
@@ -42,7 +42,6 @@ from .uncertainty import (
     estimate_uncertainty,
 )
 from .verdict import Verdict, describe_missing_encounters, judge
-from .zone_export import as_geojson, as_latex, as_ros_params
 from .zone_file import read_zone, write_zone
 
 if TYPE_CHECKING:
@@ -60,7 +59,7 @@ METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
         ),
         (),
     ),
-    "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
+    "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours")),
     "respect": (RespectEstimator.from_samples, ()),
 }
 
@@ -80,8 +79,6 @@ class SocialZone:
     side_counts : encounters by speed and side (see `szlib.zones.count_by_side`); None: unknown.
     uncertainty : intervals; None: unknown.
     null_test : the test against the null model; None: not tested.
-    null_radii : mean radius by speed of the zone that the same method gives people who ignore each other, the
-        largest of several draws from the null model [m]; empty: not tested.
 
     Raises
     ------
@@ -109,7 +106,6 @@ class SocialZone:
     side_counts: pd.DataFrame | None = None
     uncertainty: Uncertainty | None = None
     null_test: NullTest | None = None
-    null_radii: dict[float, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check_method(self.method)
@@ -179,7 +175,7 @@ class SocialZone:
             intervals.
         seed : of the resampling.
         options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05), used
-            with None too where the quantile is taken. "hull": `fraction`, `n_neighbours` and `speed_scale` as
+            with None too where the quantile is taken. "hull": `fraction` and `n_neighbours` as
             in `szlib.remove_outliers`. "paper", "respect": none.
 
         Raises
@@ -244,7 +240,7 @@ class SocialZone:
             },
             "funnel": estimator.funnel,
         }
-        test, null_radii = None, {}
+        test = None
         if null is not None:
             require(
                 r_max <= null.r_max,
@@ -254,13 +250,6 @@ class SocialZone:
                 ZoneError,
             )
             test = null_test(samples, null)
-            null_radii = (
-                dict.fromkeys(ellipses, 0.0)  # it is the difference from the null model
-                if method == "respect"
-                else fit_null_radii(
-                    build, null, len(estimator.encounters), list(ellipses), seed
-                )
-            )
         sides = uncertainty = None
         if "encounter" in samples:
             sides = count_by_side(samples, fitted_speeds, r_max=r_max)
@@ -278,7 +267,6 @@ class SocialZone:
             sides,
             uncertainty,
             test,
-            null_radii,
         )
         problems = [
             *undefined.values(),
@@ -353,8 +341,7 @@ class SocialZone:
         """One row for each fitted speed.
 
         Columns: speed [m/s]; center_x, center_y, a, b [m], angle_deg [deg], area [m2], each with _low and
-        _high (its interval, NaN if there is none); influence: the greatest change if one encounter is left
-        out [m]; encounters within r_max at that speed; adequate; verdict.
+        _high (its interval, NaN if there is none); encounters within r_max at that speed; adequate; verdict.
         """
         ellipses = sorted(self.ellipses.items())
         rows = [
@@ -363,7 +350,7 @@ class SocialZone:
         ]
         table = pd.DataFrame(rows, columns=["speed", *QUANTITIES]).set_index("speed")
         ends = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
-        table[[*ends, "influence", "encounters"]] = np.nan
+        table[[*ends, "encounters"]] = np.nan
         if self.uncertainty is not None:
             intervals = self.uncertainty.intervals.pivot(
                 index="speed", columns="quantity"
@@ -373,7 +360,6 @@ class SocialZone:
                     intervals["low"][name],
                     intervals["high"][name],
                 )
-            table["influence"] = self.uncertainty.influence.set_index("speed")["metres"]
         if self.side_counts is not None:
             table["encounters"] = self.side_counts.set_index("speed")["encounters"]
         verdicts = [str(self.verdict(v)) for v in table.index]
@@ -388,38 +374,6 @@ class SocialZone:
         return (
             plot_zones(self, ax=ax) if speed is None else plot_zone(self, speed, ax=ax)
         )
-
-    def to_geojson(self, *, n: int = 72) -> str:
-        """The ellipses as GeoJSON text: a polygon of `n` corners for each speed, with its verdict.
-
-        Coordinates are metres in the frame of the person, x ahead, y to the left: no longitudes.
-
-        Examples
-        --------
-        >>> import json, szlib
-        >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=300))
-        >>> samples = szlib.find_encounters(szlib.read_tracks(path))
-        >>> zone = szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0)
-        >>> json.loads(zone.to_geojson())["features"][0]["geometry"]["type"]
-        'Polygon'
-        """
-        return as_geojson(self, n)
-
-    def to_ros_params(self, *, layer: str = "social_zone") -> str:
-        """The ellipses as YAML text: parameters of ROS 2, lists with one entry for each speed.
-
-        They stand under ``/**: ros__parameters``, so that every node finds them in the name of the costmap
-        `layer`: speeds [m/s], center_x, center_y, semi_major, semi_minor [m], angle [rad], verdict, and the
-        radius [m] of the circle that contains the zone in every direction, for layers that know only circles.
-        """
-        return as_ros_params(self, layer)
-
-    def to_latex(self) -> str:
-        """The table of semi-axes, intervals, encounters and verdicts as LaTeX, for the package booktabs.
-
-        It needs no other package; `pandas.DataFrame.to_latex`, for all columns of `table`, needs Jinja2.
-        """
-        return as_latex(self)
 
     def save(self, path: str | Path) -> None:
         """Write the zone as JSON to the file `path`, as a whole or not at all."""

@@ -71,8 +71,6 @@ class Uncertainty:
     intervals : speed [m/s], quantity (one of `QUANTITIES`), low, high; NaN if too few resamples have a zone.
         Low and high of an angle may be outside (-90, 90] deg.
     bands : speed [m/s], direction [rad], low, high [m]: distance from the person to the ellipse.
-    influence : speed [m/s], encounter (its number), metres: the encounter that moves centre or semi-axes
-        most if it is left out, and by how much.
     has_converged : whether the chains of a posterior agree and are long enough.
     """
 
@@ -82,7 +80,6 @@ class Uncertainty:
     description: str
     intervals: pd.DataFrame
     bands: pd.DataFrame
-    influence: pd.DataFrame
     has_converged: bool = True
 
 
@@ -151,7 +148,7 @@ def resampling_units(encounters: pd.DataFrame) -> tuple[str, NDArray[np.intp]]:
 def estimate_uncertainty(
     estimator: Estimator, speeds: Sequence[float], *, n_resamples: int, seed: int
 ) -> Uncertainty:
-    """Estimate intervals, bands and influence by resampling.
+    """Estimate intervals and bands by resampling.
 
     Parameters
     ----------
@@ -205,26 +202,10 @@ def estimate_uncertainty(
     tables = (
         _interval_table(speeds, "quantity", QUANTITIES, intervals),
         _interval_table(speeds, "direction", DIRECTIONS, bands),
-        _influence(estimator, speeds, ellipses[0]),
     )
     converged = estimator.has_converged()
     return Uncertainty(
         LEVEL, int(n_resamples), unit, description, *tables, has_converged=converged
-    )
-
-
-def _influence(
-    estimator: Estimator, speeds: Sequence[float], ellipses: Array
-) -> pd.DataFrame:
-    """The most influential encounter by speed; the change is infinite if no zone is left without it."""
-    left_out, without = estimator.leave_one_out(speeds)
-    moved = np.abs(without - ellipses)[..., :4].max(axis=-1)
-    moved[np.isnan(moved)] = np.inf
-    encounter = estimator.encounters["encounter"].to_numpy()[
-        left_out[np.argmax(moved, axis=0)]
-    ]
-    return pd.DataFrame(
-        {"speed": list(speeds), "encounter": encounter, "metres": np.max(moved, axis=0)}
     )
 
 

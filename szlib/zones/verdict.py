@@ -138,15 +138,13 @@ def _place(zone: FittedZone, speed: float) -> Iterator[str]:
     resolved = 0.0 if test is None or test.sensor is None else test.sensor.resolved
     shifted = 0.0 if test is None else test.null_radius
     for fitted in _neighbours(zone, speed):
-        low = np.sqrt(max(_interval(zone, fitted, "area")[0], 0.0) / np.pi)
-        null = zone.null_radii.get(fitted, np.nan) if test is not None else 0.0
+        low = np.sqrt(np.maximum(_interval(zone, fitted, "area")[0], 0.0) / np.pi)
+        if np.isnan(low):  # `_width` says so
+            continue
         for least, what in (
             (BODY_CONTACT, "two bodies that touch are so near"),
             (resolved, "the tracker loses people who are nearer"),
-            (
-                max(null, shifted) if null == null else np.nan,
-                "the same method gives people who ignore each other a zone so large",
-            ),
+            (shifted, "people who ignore each other have a radius so large"),
         ):
             if not low > least:
                 yield (

@@ -22,20 +22,14 @@ from ..encounters.sensors import SensorCheck
 from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone
-from .respect_profile import RespectRadius
-from .respect_significance import NullTest
+from .respect_test import NullTest, RespectRadius
 from .uncertainty import Uncertainty
 from .verdict import Verdict
 
 Zone = TypeVar("Zone")
 
-FORMAT, VERSION = "szlib.SocialZone", 3
+FORMAT, VERSION = "szlib.SocialZone", 4
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
-
-# Keys in the file of attributes that have another name.
-_KEYS = {
-    "n_resamples": "resamples", "description": "how", "n_encounters": "encounters", "excluded_below": "beyond"
-}  # fmt: skip
 
 
 def write_zone(
@@ -62,13 +56,9 @@ def write_zone(
             for v, reason in sorted(fields["undefined"].items())
         ],
         "provenance": fields["provenance"],
-        "seen": fields["side_counts"],
+        "side_counts": fields["side_counts"],
         "uncertainty": fields["uncertainty"],
         "null_test": fields["null_test"],
-        "null_radii": [
-            {"speed": v, "radius": r if np.isfinite(r) else None}
-            for v, r in fields["null_radii"].items()
-        ],
         "verdicts": [
             {"speed": v, "verdict": each, "reasons": each.reasons}
             for v, each in verdicts.items()
@@ -132,15 +122,10 @@ def _read_content(path: Path) -> dict[str, Any]:
 
 def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
-    r_max, side_counts = float(content["r_max"]), content["seen"]
-    uncertainty, null_test = (
-        _rename_keys(content[name]) for name in ("uncertainty", "null_test")
-    )
+    r_max, side_counts = float(content["r_max"]), content["side_counts"]
+    uncertainty, null_test = content["uncertainty"], content["null_test"]
     if uncertainty is not None:
-        tables = {
-            name: _table(uncertainty[name])
-            for name in ("intervals", "bands", "influence")
-        }
+        tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands")}
         uncertainty = Uncertainty(**{**uncertainty, **tables})
     if null_test is not None:
         statistics = tuple(map(float, null_test["null_statistics"]))
@@ -172,10 +157,6 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "side_counts": None if side_counts is None else _table(side_counts),
         "uncertainty": uncertainty,
         "null_test": null_test,
-        "null_radii": {
-            float(each["speed"]): float(np.array(each["radius"], float))
-            for each in content["null_radii"]
-        },
     }
 
 
@@ -184,21 +165,9 @@ def _checksum(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _rename_keys(record: Mapping[str, Any] | None) -> Any:
-    """The record with attribute names instead of the keys of the file."""
-    names = {key: name for name, key in _KEYS.items()}
-    return (
-        None
-        if record is None
-        else {names.get(key, key): value for key, value in record.items()}
-    )
-
-
 def _table(content: Mapping[str, Any]) -> pd.DataFrame:
     table = pd.DataFrame(content)
-    numbers = table.columns.intersection(
-        ["speed", "direction", "low", "high", "metres"]
-    )
+    numbers = table.columns.intersection(["speed", "direction", "low", "high"])
     return table.astype(dict.fromkeys(numbers, float))
 
 
@@ -209,7 +178,7 @@ def _to_json(value: Any) -> Any:
     if isinstance(
         value, Uncertainty | NullTest | RespectRadius | SensorCheck | PolarZone
     ):
-        return {_KEYS.get(name, name): each for name, each in vars(value).items()}
+        return vars(value)
     if isinstance(value, np.generic):
         return value.item()
     if not isinstance(value, np.ndarray):

@@ -92,7 +92,7 @@ def test_result_does_not_depend_on_order_processes_or_blocks(
 ) -> None:
     extract(days[::-1], tmp_path / "reversed")
     extract(str(days[0].parent / "*.csv"), tmp_path / "two", n_jobs=2)
-    monkeypatch.setattr("szlib.encounters.blocks._BLOCK_ROWS", 700)
+    monkeypatch.setattr("szlib.encounters.near_rows._BLOCK_ROWS", 700)
     extract([days[0].parent], tmp_path / "blocks")
     for name in ("reversed", "two", "blocks"):
         assert contents(tmp_path / name) == reference

@@ -7,12 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+from helpers.pair_kinds import encounter_kinds
 from helpers.track_tables import DAY, make_crowd, make_tracks, make_walk, real_data
 from studies import sites
 
 import szlib
 from szlib.encounters.finding import find_encounters
-from szlib.encounters.kinds import COMPANIONS, KINDS, REACH, encounter_kinds, of_kind
+from szlib.encounters.kinds import COMPANIONS, KINDS, REACH, of_kind
 from szlib.tracks import funnels
 
 ROOM = szlib.Square(x=(-20, 20), y=(-20, 20))
@@ -211,10 +212,6 @@ def test_invalid_kinds_and_pairs_raise() -> None:
         of_kind(find_encounters(tracks, square=ROOM), [])
     with pytest.raises(szlib.DataError, match="no column kind"):
         of_kind(find_encounters(tracks, square=ROOM).drop(columns="kind"), "strangers")
-    with pytest.raises(szlib.DataError, match="not in these tracks"):
-        encounter_kinds(tracks, PAIR.assign(other_id=7))
-    with pytest.raises(szlib.DataError, match="other_id"):
-        encounter_kinds(tracks, PAIR.drop(columns="other_id"))
 
 
 # --- people whose companions are known ---------------------------------------------------------------

@@ -19,8 +19,8 @@ from helpers.raw_days import (
 )
 
 import szlib
-from szlib.encounters import blocks, cells
-from szlib.encounters.near_rows import read_near_area
+from szlib.encounters import near_rows
+from szlib.encounters.near_rows import reach_in_cells, read_near_area
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
@@ -56,7 +56,7 @@ def test_streamed_encounters_equal_those_of_the_whole_day(
     rows_at_once: int,
     seeds: tuple[int, ...],
 ) -> None:
-    monkeypatch.setattr(blocks, "_BLOCK_ROWS", rows_at_once)
+    monkeypatch.setattr(near_rows, "_BLOCK_ROWS", rows_at_once)
     found = 0
     for seed in seeds:
         found += assert_streamed_as_whole(
@@ -68,7 +68,7 @@ def test_streamed_encounters_equal_those_of_the_whole_day(
 def test_order_of_rows_does_not_matter(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(blocks, "_BLOCK_ROWS", 1000)
+    monkeypatch.setattr(near_rows, "_BLOCK_ROWS", 1000)
     rows = make_raw_day(1, wild=False)
     shuffled = write_raw_day(
         tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0)
@@ -81,16 +81,6 @@ def test_order_of_rows_does_not_matter(
     found = encounters(any_order, **given)
     assert len(found) > 0
     pd.testing.assert_frame_equal(encounters(in_order, **given), found)
-
-
-def test_shared_slots_select_more_rows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = write_raw_day(tmp_path / "day.csv", make_raw_day(3))
-    apart = len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0))
-    monkeypatch.setattr(cells, "_SLOTS", 64)
-    assert len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0)) > apart
-    assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=1.0) > 0
 
 
 def test_gzip_files_and_bad_rows_are_reported_as_by_read_tracks(tmp_path: Path) -> None:
@@ -147,12 +137,12 @@ DAMAGED = {
 def test_damaged_rows_are_rejected_as_by_read_raw(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: str
 ) -> None:
-    monkeypatch.setattr(blocks, "_BLOCK_ROWS", 7)
+    monkeypatch.setattr(near_rows, "_BLOCK_ROWS", 7)
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
     with open_file(path, szlib.Recipe()) as (_, scan):
-        found = blocks.UsableBlocks(scan)
+        found = near_rows.UsableBlocks(scan)
         rows = pl.concat(found)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)
@@ -201,8 +191,8 @@ def test_cells_reach_half_a_second_back_and_a_window_ahead(
     duration: float, max_gap: float
 ) -> None:
     """And one gap farther both ways, to interpolate."""
-    of = cells.Cells(szlib.ATC_SQUARE, duration, max_gap, 1e-3)
-    assert of.width > max_gap
-    for number, reach in ((of.before, 0.5), (of.after, max(duration, 0.5))):
+    width, before, after = reach_in_cells(duration, max_gap)
+    assert width > max_gap
+    for number, reach in ((before, 0.5), (after, max(duration, 0.5))):
         needed = reach + max_gap + 0.1
-        assert (number - 1) * of.width - 1e-9 < needed <= number * of.width + 1e-9
+        assert (number - 1) * width - 1e-9 < needed <= number * width + 1e-9

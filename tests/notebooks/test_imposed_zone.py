@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import make_tracks, make_walk
+from plots.encounters import match_rows
 from studies.imposed_zone import PairedSamples, impose_zone
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
-from szlib.encounters.samples import match_rows
 from szlib.tracks import funnels
 
 ZONE = szlib.Ellipse((0.15, 0.05), (0.9, 0.6), 0.3)

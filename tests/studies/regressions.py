@@ -31,7 +31,7 @@ HULL = (
 PATHS = "zones/quantile.py", "_DEGREE = 2  #", "_DEGREE = 1  #"
 LEVEL = "zones/uncertainty.py", "LEVEL = 0.95  #", "LEVEL = 0.8  #"
 RESPECT = (
-    "zones/respect_profile.py",
+    "zones/respect_test.py",
     "radius=round(float(radius.flat[best]), 2)",
     "radius=0.9 * float(radius.flat[best])",
 )

@@ -148,7 +148,7 @@ def test_stored_zone_of_another_version_is_no_obstacle(notebooks, tmp_path, caps
     notebooks(_05_zone=ZONE, _07_other="")
     assert run("--only", "05") == 0
     file = tmp_path / "out" / "mine" / "zone.json"
-    older = file.read_text().replace('"version": 3', '"version": 2')
+    older = file.read_text().replace('"version": 4', '"version": 3')
     file.write_text(older)
     capsys.readouterr()
     assert run("--only", "07") == 0

@@ -6,13 +6,11 @@ import re
 
 import numpy as np
 import pytest
-from helpers.passers import passers
 from scipy.optimize import linprog
 from shapely import LineString, MultiPoint, Point, Polygon
 
 import szlib
-from szlib.zones.estimators import Estimator
-from szlib.zones.hulls import HullEstimator, Slice, hull_vertices, slice_hull
+from szlib.zones.hulls import Slice, hull_vertices, slice_hull
 
 R_MAX = 2.0
 CUBE = np.array(
@@ -263,16 +261,3 @@ def test_origin_on_or_outside_the_rim_is_undefined(
     with pytest.raises(szlib.ZoneError) as error:
         Slice(np.array(corners, float), 1.1, R_MAX)
     assert missing_directions(str(error.value)) == (low, high)
-
-
-# --- the estimator -----------------------------------------------------------------------------------
-
-
-def test_encounters_left_out_of_all_points_give_the_same_zones() -> None:
-    """The shortcut, which keeps only the points that can become vertices, changes nothing."""
-    samples = passers(200)
-    estimator = HullEstimator.from_samples(samples, r_max=R_MAX, fraction=0.0)
-    left_out, zones = estimator.leave_one_out((0.9, 1.1))
-    expected, exact = Estimator.leave_one_out(estimator, (0.9, 1.1))
-    assert len(left_out) > 3 and left_out.tolist() == expected.tolist()
-    np.testing.assert_allclose(zones, exact, atol=1e-9)

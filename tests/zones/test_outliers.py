@@ -273,16 +273,6 @@ def test_numbers_order_and_direction_of_encounters_change_nothing() -> None:
     assert mirrored.index.equals(kept.index)
 
 
-def test_unique_speed_is_an_outlier_if_speed_counts() -> None:
-    samples = make_encounters()
-    near = samples["encounter"] == samples["encounter"][samples["distance"].idxmin()]
-    samples.loc[near, "speed"] = 6.0
-    assert removed_encounters(samples) == set()
-    assert removed_encounters(samples, speed_scale=1.0) == set(
-        samples.loc[near, "encounter"]
-    )
-
-
 def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
     samples = make_encounters(intruders=4)
     kept = remove_outliers(samples)
@@ -354,22 +344,15 @@ def test_real_day_has_no_outliers(real_samples: pd.DataFrame) -> None:
 # --- the paper's quota of samples --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("speed_scale", [None, 0.5])
 @pytest.mark.parametrize("neighbours", [5, 20])
 @pytest.mark.parametrize("fraction", [0.002, 0.05])
-def test_outliers_equal_scikit_learn(
-    fraction: float, neighbours: int, speed_scale: float | None
-) -> None:
+def test_outliers_equal_scikit_learn(fraction: float, neighbours: int) -> None:
     samples = close(make_samples())
     radius, angle = 2 - samples["distance"], samples["los_angle"]
     features = [radius * np.cos(angle), radius * np.sin(angle)]
-    if speed_scale:
-        features.append(speed_scale * samples["speed"])
     lof = LocalOutlierFactor(n_neighbors=neighbours, contamination=fraction)
     expected = lof.fit_predict(np.column_stack(features)) == -1
-    found = is_outlier(
-        samples, fraction=fraction, n_neighbours=neighbours, speed_scale=speed_scale
-    )
+    found = is_outlier(samples, fraction=fraction, n_neighbours=neighbours)
     np.testing.assert_array_equal(found, expected)
 
 
@@ -465,8 +448,6 @@ def test_a_few_identical_samples_need_no_noise() -> None:
             {"n_neighbours": 1000},
             r"got 1000 neighbours, \d+ samples; add data, or pass a smaller",
         ),
-        ({"speed_scale": 0}, "speed_scale must be a positive number"),
-        ({"speed_scale": np.nan}, "speed_scale must be a positive number"),
     ],
 )
 def test_invalid_parameters_are_refused(options: dict, message: str) -> None:
@@ -485,16 +466,6 @@ def test_invalid_samples_are_refused() -> None:
     ):
         remove_outliers(
             samples.assign(distance=samples["distance"].where(samples.index != 4))
-        )
-    with pytest.raises(
-        szlib.DataError, match=r"row \d+: got .*nan.*; expected a finite speed"
-    ):
-        remove_outliers(
-            samples.assign(speed=np.nan), fraction=FRACTION, speed_scale=1.0
-        )
-    with pytest.raises(szlib.DataError, match=r"columns \['speed'\] are missing"):
-        remove_outliers(
-            samples.drop(columns="speed"), fraction=FRACTION, speed_scale=1.0
         )
 
 

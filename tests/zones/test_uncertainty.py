@@ -1,4 +1,4 @@
-"""Uncertainty: counts by side, resampling units, coverage of intervals, influence of one encounter."""
+"""Uncertainty: counts by side, resampling units, coverage of intervals."""
 
 from __future__ import annotations
 
@@ -167,45 +167,12 @@ def test_intervals_contain_the_limit() -> None:
     assert np.mean(held) >= 0.85
 
 
-def test_influence_equals_the_change_without_one_encounter(
-    samples: pd.DataFrame,
-) -> None:
-    for method, options in (("quantile", {}), ("hull", {"fraction": 0.0})):
-        zone = fit(samples, method=method, n_resamples=2, **options)
-        influence = zone.uncertainty.influence.iloc[0]
-        without = fit(
-            samples[samples["encounter"] != influence["encounter"]],
-            method=method,
-            n_resamples=0,
-            **options,
-        )
-        before, after = zone.table().iloc[0], without.table().iloc[0]
-        moved = max(abs(before[q] - after[q]) for q in QUANTITIES[:4])
-        # the hull's, around 72 directions
-        assert moved == pytest.approx(influence["metres"], abs=2e-3)
-        some = np.random.default_rng(0).choice(
-            samples["encounter"].unique(), 3, replace=False
-        )
-        for encounter in some:
-            rest = fit(
-                samples[samples["encounter"] != encounter],
-                method=method,
-                n_resamples=0,
-                **options,
-            )
-            other = max(
-                abs(before[q] - rest.table().iloc[0][q]) for q in QUANTITIES[:4]
-            )
-            assert other <= influence["metres"] + 2e-3
-
-
 def test_resamples_without_a_zone_leave_no_interval() -> None:
     """Three people seen around more than half of the circle: without one of them there is no zone."""
     three = passers(3, seed=4)
     with pytest.warns(szlib.DataWarning, match="fewer than 20"):
         zone = fit(three, n_resamples=40)
     assert zone.table().filter(regex="_low$|_high$").isna().all(axis=None)
-    assert zone.uncertainty.influence["metres"].tolist() == [np.inf]
 
 
 @pytest.mark.parametrize("resamples", [1, -3, 2.5])
@@ -266,9 +233,6 @@ class Turning(Estimator):
             [0.0, 0.0, 1.0, 0.7, angle], (len(weights), len(speeds), 5)
         )
 
-    def find_influential(self, speeds: Sequence[float]) -> np.ndarray:
-        return np.arange(1)
-
 
 def test_an_axis_has_no_direction() -> None:
     encounters = pd.DataFrame({"encounter": range(30)})
@@ -276,23 +240,3 @@ def test_an_axis_has_no_direction() -> None:
     found = estimate_uncertainty(estimator, SPEEDS, n_resamples=20, seed=0).intervals
     angle = found[found["quantity"] == "angle_deg"].iloc[0]
     assert (angle["low"], angle["high"]) == pytest.approx((91, 91))
-
-
-def test_an_encounter_that_only_turns_the_zone_has_no_influence() -> None:
-    class TurningAlone(Turning):
-        def refit(self, weights: np.ndarray, *given: object) -> np.ndarray:
-            """A tenth of a metre to the side for the first encounter, turned for every other one."""
-            found = np.tile([0.0, 0.0, 1.0, 0.7, 0.0], (len(weights), 1, 1))
-            found[..., 4] = 1.5 * (weights[:, 1:].min(axis=1) == 0)[:, None]
-            found[..., 1] = 0.1 * (weights[:, 0] == 0)[:, None]
-            return found
-
-        def find_influential(self, speeds: Sequence[float]) -> np.ndarray:
-            return np.array([2, 0])
-
-    encounters = pd.DataFrame({"encounter": range(10, 40)})
-    estimator = TurningAlone(encounters=encounters, parameters={}, funnel=[])
-    found = estimate_uncertainty(estimator, SPEEDS, n_resamples=5, seed=0).influence
-    assert found.to_dict("records") == [
-        {"speed": 1.1, "encounter": 10, "metres": pytest.approx(0.1)}
-    ]

@@ -14,7 +14,7 @@ from studies.imposed_zone import PairedSamples
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
-from szlib.zones.respect_profile import Approaches, fit_radius
+from szlib.zones.respect_test import Approaches, fit_radius
 from szlib.zones.verdict import describe_missing_encounters
 
 SHIFTS, SPEED = 39, 1.1
@@ -130,11 +130,6 @@ def test_careless_share_above_q_is_noticed() -> None:
     ("change", "reason"),
     [
         ({"uncertainty": None}, "the interval of the semi-axis a cannot be given"),
-        (
-            {"null_radii": {SPEED: 1.5}},
-            "larger than 1.50 m: the same method gives people who ignore each other a zone so large",
-        ),
-        ({"null_radii": {SPEED: np.nan}}, "not clearly larger"),
         ({"side_counts": None}, "encounters were not counted by side"),
     ],
 )
@@ -157,6 +152,15 @@ def test_a_tracker_that_loses_people_is_undecided(careful: szlib.SocialZone) -> 
     )
     verdict = replace(careful, null_test=test).verdict(SPEED)
     assert "the tracker loses people who are nearer" in verdict.sentence
+
+
+def test_a_zone_no_larger_than_that_of_people_who_ignore_each_other_is_undecided(
+    careful: szlib.SocialZone,
+) -> None:
+    test = replace(careful.null_test, null_radius=1.5)
+    verdict = replace(careful, null_test=test).verdict(SPEED)
+    assert verdict == "undecided"
+    assert "larger than 1.50 m: people who ignore each other" in verdict.sentence
 
 
 def test_groups_that_were_moved_one_by_one_are_undecided(

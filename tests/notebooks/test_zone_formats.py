@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 import shapely
 import yaml
+from zone_formats import as_geojson, as_latex, as_ros_params
 
 import szlib
 
@@ -29,7 +30,7 @@ def zone() -> szlib.SocialZone:
 
 
 def test_geojson_holds_the_ellipses(zone: szlib.SocialZone) -> None:
-    content = json.loads(zone.to_geojson(n=180))
+    content = json.loads(as_geojson(zone, n=180))
     assert content["type"] == "FeatureCollection"
     assert [feature["properties"]["speed"] for feature in content["features"]] == [
         0.9,
@@ -49,7 +50,7 @@ def test_geojson_holds_the_ellipses(zone: szlib.SocialZone) -> None:
 
 
 def test_geojson_file_is_an_area(zone: szlib.SocialZone, tmp_path) -> None:  # type: ignore[no-untyped-def]
-    one = json.loads(zone.to_geojson())["features"][1]
+    one = json.loads(as_geojson(zone))["features"][1]
     (tmp_path / "zone.geojson").write_text(json.dumps(one))
     assert szlib.as_area(tmp_path / "zone.geojson").area == pytest.approx(
         zone.ellipses[1.1].area, rel=5e-3
@@ -57,7 +58,7 @@ def test_geojson_file_is_an_area(zone: szlib.SocialZone, tmp_path) -> None:  # t
 
 
 def test_ros_parameters_are_lists_of_one_type_by_speed(zone: szlib.SocialZone) -> None:
-    content = yaml.safe_load(zone.to_ros_params(layer="people"))
+    content = yaml.safe_load(as_ros_params(zone, layer="people"))
     (values,) = (content["/**"]["ros__parameters"][name] for name in ["people"])
     assert values["speeds"] == [0.9, 1.1, 1.3]
     assert {len(each) for each in values.values()} == {3}
@@ -80,7 +81,7 @@ def test_latex_needs_no_jinja(
     zone: szlib.SocialZone, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    lines = zone.to_latex().splitlines()
+    lines = as_latex(zone).splitlines()
     assert lines[0] == r"\begin{tabular}{rllrl}" and lines[-1] == r"\end{tabular}"
     assert (
         lines[2]
@@ -95,4 +96,4 @@ def test_latex_needs_no_jinja(
     assert [row[1][:4] for row in rows] == [
         f"{zone.ellipses[v].semi_axes[0]:.2f}" for v in (0.9, 1.1, 1.3)
     ]
-    assert not re.search(r"(?<!\\)[%#_]", zone.to_latex())
+    assert not re.search(r"(?<!\\)[%#_]", as_latex(zone))

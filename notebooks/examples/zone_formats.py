@@ -1,4 +1,4 @@
-"""A fitted zone in the formats of other programs: GeoJSON, parameters of ROS 2, LaTeX, plain text."""
+"""A fitted zone in the formats of other programs: GeoJSON, parameters of ROS 2, LaTeX."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import json
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import yaml
 
-from .. import __version__
-from .ellipses import circle_around
-from .verdict import FittedZone
+from szlib import SocialZone, __version__
+from szlib.workbook.fit_command import format_table
+from szlib.zones.ellipses import circle_around
 
 _DIGITS = 4  # decimals of metres and radians: tenths of a millimetre
 _SPECIAL = {
@@ -22,25 +21,11 @@ _SPECIAL = {
 }  # letters that LaTeX reads as commands
 
 
-def format_table(zone: FittedZone) -> pd.DataFrame:
-    """The table of a `zone` as texts: semi-axes with their 95 % intervals, encounters, verdict."""
-    table = zone.table()
-    shown = pd.DataFrame({"speed [m/s]": table["speed"].map("{:g}".format)})
-    for name in ("a", "b"):
-        rows = table[[name, f"{name}_low", f"{name}_high"]].itertuples(index=False)
-        shown[f"{name} [m] (95 %)"] = [
-            f"{v:.2f} ({low:.2f} to {high:.2f})"
-            if high == high
-            else f"{v:.2f} (unknown)"
-            for v, low, high in rows
-        ]
-    return shown.assign(
-        encounters=table["encounters"].map("{:,.0f}".format), verdict=table["verdict"]
-    )
+def as_latex(zone: SocialZone) -> str:
+    """The table of a `zone` as a LaTeX `tabular` with the rules of the package booktabs.
 
-
-def as_latex(zone: FittedZone) -> str:
-    """The table of a `zone` as a LaTeX `tabular` with the rules of the package booktabs."""
+    It needs no other package; `pandas.DataFrame.to_latex`, for all columns of its table, needs Jinja2.
+    """
     table = format_table(zone)
     texts: list[list[str]] = [list(table.columns), *table.to_numpy().tolist()]
     rows = [" & ".join(map(_escape, row)) + r" \\" for row in texts]
@@ -59,8 +44,11 @@ def _escape(text: str) -> str:
     return "".join(_SPECIAL.get(letter, letter) for letter in text)
 
 
-def as_geojson(zone: FittedZone, n: int) -> str:
-    """The ellipses of a `zone` as GeoJSON: a polygon of `n` corners for each speed."""
+def as_geojson(zone: SocialZone, n: int = 72) -> str:
+    """The ellipses of a `zone` as GeoJSON: a polygon of `n` corners for each speed, with its verdict.
+
+    Coordinates are metres in the frame of the person, x ahead, y to the left: no longitudes.
+    """
     features = []
     for speed, ellipse in sorted(zone.ellipses.items()):
         ring = ellipse.curve(n + 1).round(_DIGITS)
@@ -71,19 +59,20 @@ def as_geojson(zone: FittedZone, n: int) -> str:
             **_numbers(ellipse),
         }
         geometry = {"type": "Polygon", "coordinates": [ring.tolist()]}
-        features.append(
-            {"type": "Feature", "properties": properties, "geometry": geometry}
-        )
+        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     return json.dumps({"type": "FeatureCollection", "features": features}, indent=1)
 
 
-def as_ros_params(zone: FittedZone, layer: str) -> str:
-    """The ellipses of a `zone` as YAML: a file of parameters of ROS 2 for the costmap `layer`."""
+def as_ros_params(zone: SocialZone, layer: str = "social_zone") -> str:
+    """The ellipses of a `zone` as YAML: parameters of ROS 2, lists with one entry for each speed.
+
+    They stand under ``/**: ros__parameters``, so that every node finds them in the name of the costmap
+    `layer`: speeds [m/s], center_x, center_y, semi_major, semi_minor [m], angle [rad], verdict, and the
+    radius [m] of the circle that contains the zone in every direction, for layers that know only circles.
+    """
     speeds = sorted(zone.ellipses)
     numbers = [_numbers(zone.ellipses[speed]) for speed in speeds]
-    lists: dict[str, list[Any]] = {
-        name: [each[name] for each in numbers] for name in numbers[0]
-    }
+    lists: dict[str, list[Any]] = {name: [each[name] for each in numbers] for name in numbers[0]}
     circles = [circle_around(zone.ellipses[speed]).semi_axes[0] for speed in speeds]
     # not too small
     radii = [float(np.ceil(radius * 10**_DIGITS) / 10**_DIGITS) for radius in circles]
@@ -93,9 +82,7 @@ def as_ros_params(zone: FittedZone, layer: str) -> str:
         "radius": radii,
         "verdict": [str(zone.verdict(v)) for v in speeds],
     }
-    text = yaml.safe_dump(
-        {"/**": {"ros__parameters": {layer: values}}}, sort_keys=False, width=100
-    )
+    text = yaml.safe_dump({"/**": {"ros__parameters": {layer: values}}}, sort_keys=False, width=100)
     head = (
         f"szlib {__version__}: social zones by method {zone.method}, one for each walking speed [m/s]",
         "ellipses in the frame of the person, x ahead, y to the left [m, rad]",
@@ -108,7 +95,4 @@ def _numbers(ellipse: Any) -> dict[str, float]:
     """Centre, semi-axes and angle of an ellipse by name [m, rad]."""
     values = (*ellipse.center, *ellipse.semi_axes, ellipse.angle)
     names = ("center_x", "center_y", "semi_major", "semi_minor", "angle")
-    return {
-        name: round(float(value), _DIGITS)
-        for name, value in zip(names, values, strict=True)
-    }
+    return {name: round(float(value), _DIGITS) for name, value in zip(names, values, strict=True)}

@@ -11,7 +11,7 @@ from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.core.errors import DataError, DataWarning, ZoneError
-from szlib.zones.respect_significance import null_test
+from szlib.zones.respect_test import null_test
 
 KINDS = ("opposite", "crossing")
 SHIFTS = 39
