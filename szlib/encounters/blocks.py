@@ -35,7 +35,7 @@ class UsableBlocks:
 
     def __iter__(self) -> Iterator[pl.DataFrame]:
         read = 0  # line numbers of the scan take long
-        columns = self.scan.select("ragged", "exact_id", *NUMBERS)
+        columns = self.scan.select("ragged", *NUMBERS)
         for block in columns.collect_batches(
             chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"
         ):

@@ -19,6 +19,7 @@ from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
 from ..tracks.plausibility import check_unit
 from ..tracks.readers import (
+    LoadedFile,
     is_streamed,
     merge,
     open_file,
@@ -28,7 +29,6 @@ from ..tracks.readers import (
     with_days,
 )
 from ..tracks.recipe import Recipe, find_recipe
-from ..tracks.recordings import LoadedFile
 from .blocks import UsableBlocks
 from .cells import Cells, UnsortedError, select_near
 from .geometry import Area
