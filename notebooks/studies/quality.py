@@ -108,7 +108,7 @@ def _usable_rows(path: str | Path, recipe: Recipe | None) -> Iterator[tuple[Reci
     with open_file(path := Path(path), find_recipe([path], recipe)) as (found, scan):
         yield (
             found,
-            scan.filter(rejection_reason(scan).is_null()).with_columns(id="exact_id"),
+            scan.filter(rejection_reason(scan).is_null()),
         )
 
 

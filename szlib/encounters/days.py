@@ -28,9 +28,8 @@ from ..core.files import claim_folder, folder_purpose
 from ..core.input_files import printable, read_json_object, unchanged_files
 from ..core.parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.readers import find_day
+from ..tracks.readers import find_day, name_recordings
 from ..tracks.recipe import Recipe, find_recipe
-from ..tracks.recordings import name_recordings
 from .areas import has_calendar
 from .geometry import Area
 from .one_day import (

@@ -40,6 +40,7 @@ from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
 from ..tracks.plausibility import check_unit
 from ..tracks.readers import (
+    LoadedFile,
     is_streamed,
     merge,
     open_file,
@@ -50,7 +51,6 @@ from ..tracks.readers import (
     with_days,
 )
 from ..tracks.recipe import Recipe, find_recipe
-from ..tracks.recordings import LoadedFile
 from .geometry import Area, Square
 from .kinds import REACH
 from .occupants import TrackRows
@@ -122,7 +122,7 @@ class UsableBlocks:
 
     def __iter__(self) -> Iterator[pl.DataFrame]:
         read = 0  # line numbers of the scan take long
-        columns = self.scan.select("ragged", "exact_id", *NUMBERS)
+        columns = self.scan.select("ragged", *NUMBERS)
         for block in columns.collect_batches(
             chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"
         ):

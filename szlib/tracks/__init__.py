@@ -6,17 +6,13 @@ shapes        the shapes of files that have a name, each with its recipe
 sources       files and tables as columns: text, Parquet, Feather, SQLite, JSON, those of libraries
 columns       which column holds what
 rows          from columns to rows in seconds and metres
-plausibility  whether people can move as they do in a table; if not, what was misread
-recordings    which files are pieces of one recording
+plausibility  whether people can move as they do in a table; if not, with which recipe they would
 readers       rows of files as they are: `read_raw`
 clock         rows brought to multiples of 0.1 s, with velocities: `read_tracks`, `to_clock`
-quality       what a file was read as: columns, people, a map
-interop       what a track table must be: `check_tracks`; PedPy
 datasets      named data and paths, downloads verified by hash
 """
 
 from . import datasets, funnels
-from .clock import clock_index, read_tracks, to_clock
-from .interop import check_tracks, to_pedpy
+from .clock import check_tracks, clock_index, read_tracks, to_clock, to_pedpy
 from .readers import read_raw
 from .recipe import Recipe

@@ -1,4 +1,7 @@
-"""Which column of a table holds what: by the names given, by usual names, or by how people would walk."""
+"""Which column of a table holds what, and its values as numbers, times and ids.
+
+Columns are found by the names given, by usual names, or by how people would walk.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,16 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import polars as pl
 
 from ..core.errors import DataError
-from .motion import find_walking
-from .recipe import DEGREES, PIXELS, UNITS, Recipe, advise
+from .plausibility import suggest_columns
+from .recipe import DEGREES, PIXELS, TIME_UNITS, UNITS, Recipe, advise
 from .sources import Source
-from .values import to_ids, to_numbers, to_times
 
 # Usual names of each quantity, without blanks, underscores and accents; the first one is taken before others.
 _USUAL = {
@@ -54,8 +57,17 @@ _LONGEST_SHARE = (
 _FRAMES = 25.0  # a usual frame rate [1/s], to find columns
 _LISTED = 40  # number of columns that are looked at
 _PIXEL = 0.02  # metres in a pixel that an error message shows as an example
-_GUESSED = 6  # number of columns that are tried out, as whose people walk
+_TRIED = 8  # number of columns that are tried out, with those that are known
 _SAMPLE = 2000  # rows in which columns are guessed
+
+# Times without a unit whose median is larger count in this unit since 1970: as seconds they would be
+# later than the year 5000.
+_SINCE_1970 = {1e17: "ns", 1e14: "us", 1e11: "ms"}
+_DATE = r"^(?:19|20)\d{2}-\d{2}-\d{2}"  # beginning of an ISO time
+_ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
+_EXCEL_1970 = 25_569  # number of the day 1970-01-01 in Excel
+_SHORT = 11  # bits of a hash that are left out: a float holds the others exactly
+_EXACT = 2.0**53  # floats hold smaller whole numbers exactly
 
 
 def find_columns(source: Source, recipe: Recipe) -> Recipe:
@@ -279,67 +291,30 @@ def _suggest(
     missing: Sequence[str],
 ) -> str:
     """As which columns people would walk, and how to read them.  A constant column is none of them."""
-    time = "frame" if "frame" in (*found, *missing) else "t"
-    names, given = source.names, dict(recipe.columns or {})
-    listed = (
-        ", ".join(map(repr, filter(None, names[:12])))
-        or f"{len(names)} fields without a header"
-    )
-    question = (
-        f"it has {listed}; {advise(columns={**given, **dict.fromkeys(missing, '...')})}"
-    )
-    known = {
-        q: column_of(source, at).head(_SAMPLE)
-        for q, at in found.items()
-        if q in (time, "id", "x", "y")
+    names = [name or k for k, name in enumerate(source.names)]
+    columns = {
+        at: _as_floats(column_of(source, at).head(_SAMPLE)) for at in found.values()
     }
-    free = [k for k in range(len(names)) if (names[k] or k) not in found.values()][
-        :_LISTED
-    ]
-    columns: dict[str | int, np.ndarray] = {
-        found[q]: _as_floats(values) for q, values in known.items()
-    }
-    for k in free:
-        numbers = _as_floats(source.column(k).head(_SAMPLE))
+    for name in names[:_LISTED]:
+        if name in columns or len(columns) == _TRIED:
+            continue
+        numbers = _as_floats(column_of(source, name).head(_SAMPLE))
         usable = numbers[np.isfinite(numbers)]
-        if (
-            2 * len(usable) > len(numbers)
-            and np.ptp(usable) > 0
-            and len(columns) < _GUESSED + len(known)
-        ):
-            columns[names[k] or k] = numbers
-    if not free or not columns:
-        return question
-    shown, values = list(columns), np.array(list(columns.values()))
-    places = {
-        ("t", "id", "x", "y").index("t" if q == time else q): shown.index(found[q])
-        for q in known
-    }
-    metres = {UNITS[u] for _, u in map(_split_unit, names) if u in UNITS} | {
-        recipe.metres
-    } - {None}
-    for rate, unit in product(
-        (1.0, _FRAMES) if time == "t" else (_FRAMES,),
-        metres or [UNITS[u] for u in ("m", "cm", "mm", "ft")],
+        if 2 * len(usable) > len(numbers) and np.ptp(usable) > 0:
+            columns[name] = numbers
+    time = "frame" if "frame" in (*found, *missing) else "t"
+    at, shown = [found.get(name) for name in (time, "id", "x", "y")], list(columns)
+    known = [None if name is None else shown.index(name) for name in at]
+    reading = replace(recipe, columns=dict(found) or None)
+    if columns and (
+        advice := suggest_columns(
+            np.array(list(columns.values())), shown, known, reading
+        )
     ):
-        if order := find_walking(values, places, rate, unit or 1.0):
-            is_counted = rate != 1
-            time = "frame" if is_counted else "t"
-            chosen = dict(
-                zip((time, "id", "x", "y"), [shown[k] for k in order], strict=True)
-            )
-            name = next((name for name, each in UNITS.items() if each == unit), "m")
-            more: dict[str, object] = {"frame_rate": _FRAMES} if is_counted else {}
-            if not metres and name in (
-                ("cm", "mm") if is_counted else ("cm", "mm", "ft")
-            ):
-                more["unit"] = name
-            guess = (
-                f"{_FRAMES:g} frames a second are only a guess: " if is_counted else ""
-            )
-            reading = given | chosen
-            return f"people walk if these are {reading}; {guess}{advise(columns=reading, **more)}"
-    return question
+        return advice
+    listed = ", ".join(map(repr, names[:12]))
+    given = dict(recipe.columns or {}) | dict.fromkeys(missing, "...")
+    return f"it has {listed}; {advise(columns=given)}"
 
 
 def _as_floats(values: pl.Series) -> np.ndarray:
@@ -347,8 +322,108 @@ def _as_floats(values: pl.Series) -> np.ndarray:
     for decimal in (".", ","):
         numbers = to_numbers(values, decimal)
         if 2 * numbers.null_count() <= len(values):
-            return to_times(numbers, "UTC").seconds.fill_null(np.nan).to_numpy()
-    times = to_times(values, "UTC").seconds
+            return to_times(numbers, "UTC")[0].fill_null(np.nan).to_numpy()
+    times = to_times(values, "UTC")[0]
     if 2 * times.null_count() <= len(values):
         return times.fill_null(np.nan).to_numpy()
-    return to_ids(values).cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy()
+    return to_ids(values, "").cast(pl.Float64).fill_null(np.nan).to_numpy()
+
+
+# --- values -------------------------------------------------------------------------------------------
+
+
+def to_numbers(values: pl.Series, decimal: str = ".") -> pl.Series:
+    """The numbers in a column of `values`; null where one is no number.  `decimal` is the point of texts."""
+    if values.dtype == pl.String:
+        values = values.str.strip_chars(" \"'")
+        values = (
+            values.str.replace(",", ".", literal=True) if decimal == "," else values
+        )
+    try:
+        return values.cast(pl.Float64, strict=False)
+    except pl.exceptions.PolarsError:  # a list, an object
+        return pl.repeat(None, len(values), dtype=pl.Float64, eager=True)
+
+
+def to_times(
+    values: pl.Series, tz: str, unit: str | None = None, decimal: str = "."
+) -> tuple[pl.Series, pl.Series | None]:
+    """The times in a column of `values`: numbers with a point `decimal`, dates, durations, ISO texts.
+
+    Numbers are in a `unit` of time; None takes seconds, or a shorter unit for counts since 1970.  Times
+    without a zone are those of `tz`.  Returns seconds, since 1970 where times are dates; and the local date
+    of each where the column states its zone, else None.
+    """
+    if values.dtype == pl.Duration:
+        return values.dt.total_nanoseconds() / 1e9, None
+    if isinstance(values.dtype, pl.Datetime | pl.Date):
+        zone = getattr(values.dtype, "time_zone", None)
+        dates = values.cast(pl.Datetime("ns", zone)).to_pandas()
+        if zone is not None:
+            return _since_1970(dates), values.dt.replace_time_zone(None).dt.date()
+        return _since_1970(_localize(dates, tz)), None
+    numbers = to_numbers(values, decimal)
+    if values.dtype == pl.String and 2 * numbers.null_count() > len(values):
+        text = values.str.strip_chars(" \"'")
+        dates = text.set(~text.str.contains(_DATE).fill_null(False), None).to_pandas()
+        parsed = pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce")
+        has_zone = text.str.contains(_ZONE).fill_null(False)
+        if has_zone.any():
+            day = text.str.slice(0, 10).str.to_date("%Y-%m-%d", strict=False)
+            return _since_1970(parsed.where(has_zone.to_numpy())), day
+        if parsed.notna().any():
+            return _since_1970(_localize(parsed.dt.tz_localize(None), tz)), None
+    if unit == "days":
+        ms = ((numbers - _EXCEL_1970) * 86_400_000).round()
+        return to_times(ms.cast(pl.Int64, strict=False).cast(pl.Datetime("ms")), tz)
+    middle = numbers.drop_nans().abs().quantile(0.5) or 0.0
+    usual = next((name for least, name in _SINCE_1970.items() if middle >= least), "s")
+    return numbers * TIME_UNITS[unit or usual], None
+
+
+def to_ids(values: pl.Series, where: str) -> pl.Series:
+    """The ids in a column of `values` as whole numbers; null where one is missing or no whole number.
+
+    Where most are no numbers, each text gets a number, the same in every file: 53 bits of a hash, so that two
+    of 100,000 people share one with a probability below 1e-6.  Raises DataError, beginning with `where`, if
+    two texts are one number.
+    """
+    if values.dtype.is_numeric():
+        return _to_whole(values)
+    text = values.cast(pl.String).str.strip_chars(" \"'")
+    text = text.set(text == "", None)
+    n_numbers = text.cast(pl.Float64, strict=False).count()
+    if 2 * n_numbers < text.count():
+        names = text.drop_nulls().unique()
+        hashes = pd.util.hash_array(names.to_numpy().astype(object), categorize=False)
+        numbers = pl.Series((hashes >> _SHORT).astype("int64"))
+        return text.replace_strict(names, numbers, default=None)
+    whole = _to_whole(text)
+    known = pl.DataFrame({"text": text, "id": whole}).drop_nulls().unique()
+    alike = known.filter(pl.col("id").is_duplicated()).sort("id", "text")["text"]
+    if len(alike):
+        raise DataError(
+            f"{where}: the ids {alike[0]!r} and {alike[1]!r} are the same number; write them alike if they "
+            f"are one person, else as names, such as 'p{alike[0]}' and 'p{alike[1]}'"
+        )
+    return whole
+
+
+def _to_whole(values: pl.Series) -> pl.Series:
+    """The whole numbers among `values`, numbers or texts; null for others."""
+    number = values.cast(pl.Float64, strict=False)
+    is_whole = (number == number.floor()) & (number.abs() < _EXACT)
+    whole = pl.select(pl.when(is_whole).then(number).cast(pl.Int64, strict=False))
+    exact = values.cast(pl.Int64, strict=False) if not values.dtype.is_float() else None
+    return whole.to_series() if exact is None else exact.fill_null(whole.to_series())
+
+
+def _localize(times: Any, tz: str) -> Any:
+    """Times of the clock in `tz`; those that its changes make ambiguous are missing."""
+    return times.dt.tz_localize(tz, ambiguous="NaT", nonexistent="NaT")
+
+
+def _since_1970(times: Any) -> pl.Series:
+    """Times with a zone as seconds since 1970; null where they are missing."""
+    seconds = (times - pd.Timestamp(0, tz="UTC")).dt.total_seconds()
+    return pl.Series(seconds.to_numpy()).fill_nan(None)

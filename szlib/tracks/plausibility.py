@@ -1,31 +1,116 @@
-"""Whether tracks can be those of people; if not, which unit, time or column was probably misread.
+"""Whether tracks can be those of people; if not, with which other recipe they would be.
 
 People walk at 1 to 2 m/s, are seen every few seconds at the latest, and a site is between a metre and a
-kilometre wide.  Where most people of a table do something else, other readings are tried: other units, other
-times, exchanged columns, degrees.  The error message suggests the first one in which people walk.
+kilometre wide.  Where most people of a table do something else, other units, times and columns are tried.
+The error message suggests the first of them with which people walk.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import permutations
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
 
 from ..core.errors import DataError, warn
-from .motion import FASTEST, MAX_SITE, REGULAR, find_walking, measure_motion
-from .recipe import TIME_UNITS, UNITS, Recipe, advise
+from .recipe import DEGREES, TIME_UNITS, UNITS, Recipe, advise
 from .shapes import SHAPES
 
-_MIN_SITE = 0.5  # a smaller site [m] means that metres were read as millimetres
+# widest site [m]; a smaller site [m] means that metres were read as millimetres
+_SITES = (0.5, 1000.0)
+# greatest median and greatest 90 % quantile of the speed of people [m/s]
+_FASTEST = (3.0, 6.0)
+# smallest and greatest 90 % quantile of the speed where people certainly walk [m/s]
+_WALKS = (0.6, 4.0)
+# shortest and longest usual time between two samples of a person [s]
+_STEPS = (0.005, 5.0)
+_ROUGH = 1.0  # greatest roughness of ways; people who are mixed up have 1.4 and more
+_MIN_STEPS = 20  # number of steps that allows a judgement
+# greatest interquartile range of the sampling interval, over its median, of a regular clock
+_REGULAR = 0.5
 # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
 _SPRINT, _JUMP = (12.5, 100.0)
-_ROWS = 200_000  # number of rows that are looked at
+MOST_SHOWN = 200_000  # number of rows that are looked at
 _DEGREE = 111_320.0  # metres in a degree of latitude, or of longitude at the equator
 _WALK = 1.2  # a usual walking speed [m/s]
 _FRAMES = 25.0  # a usual frame rate [1/s], for suggestions
+_LIKE_THIS = "people walk if it is read like this"
 _SURE = ("atc-raw", "ewap")  # shapes whose units cannot be others
+# letters in a line of a map; letters from nobody to most people
+_MAP, _INK = (60, " .:+#")
+
+
+class Motion(NamedTuple):
+    """How people move in a table.
+
+    Attributes
+    ----------
+    median_speed, high_speed : median and 90 % quantile of the speed of people [m/s].
+    interval : median time between two samples of a person [s].
+    irregularity : interquartile range of that time, over its median.
+    width : width of the site [m].
+    roughness : median change of the velocity from one second to the next, over the median speed.
+    """
+
+    median_speed: float
+    high_speed: float
+    interval: float
+    irregularity: float
+    width: float
+    roughness: float
+
+    @property
+    def fault(self) -> str:
+        """Why people cannot move like this; empty where they can."""
+        if self.median_speed > _FASTEST[0] or self.high_speed > _FASTEST[1]:
+            return f"people move at {self.median_speed:.3g} m/s (median), expected 0 to {_FASTEST[0]:g}"
+        if self.high_speed < _WALKS[0]:
+            quantiles = f"the median of their speed is {self.median_speed:.2g} m/s, the 90 % quantile"
+            return f"nobody walks: {quantiles} {self.high_speed:.2g} m/s"
+        return ""
+
+    @property
+    def is_walking(self) -> bool:
+        """Whether people certainly walk, and are sampled regularly."""
+        return (
+            not self.fault
+            and self.high_speed <= _WALKS[1]
+            and self.irregularity <= _REGULAR
+            and _STEPS[0] <= self.interval <= _STEPS[1]
+            and 1 <= self.width <= _SITES[1]
+            and self.roughness < _ROUGH
+        )
+
+
+def measure_motion(rows: np.ndarray) -> Motion | None:
+    """How people move in `rows` t [s], id, x, y [m], shape (4, n); None where there are too few steps."""
+    rows = rows[:, np.isfinite(rows).all(axis=0)]
+    t, person, x, y = rows[:, np.lexsort((rows[0], rows[1]))]
+    same = person[1:] == person[:-1]
+    steps = np.diff(t)[same]
+    # one row a second
+    first = np.flatnonzero(np.r_[True, ~same | (np.diff(np.floor(t)) != 0)][: len(t)])
+    by_second = person[first][1:] == person[first][:-1]
+    if by_second.sum() < _MIN_STEPS:
+        return None
+    moved = np.diff([x[first], y[first]], axis=1)
+    velocity = moved / np.where(by_second, np.diff(t[first]), np.nan)
+    speed = np.hypot(*velocity)[by_second]
+    change = np.hypot(*np.diff(velocity, axis=1))
+    change = change[np.isfinite(change)]
+    median, fast = np.quantile(speed, [0.5, 0.9])
+    low, step, high = np.quantile(steps, [0.25, 0.5, 0.75])
+    return Motion(
+        median_speed=float(median),
+        high_speed=float(fast),
+        interval=float(step),
+        irregularity=float((high - low) / step) if step > 0 else np.inf,
+        width=float(np.ptp(np.quantile([x, y], [0.01, 0.99], axis=1), axis=0).max()),
+        roughness=float(np.median(change) / median) if len(change) and median else 0.0,
+    )
 
 
 def check_people(
@@ -42,30 +127,36 @@ def check_people(
     """
     if is_table_known(recipe):
         return
-    seen = first_rows(rows)
-    found = measure_motion(seen)
-    if found is None:
-        days = (seen[0] - seen[0].min()) * TIME_UNITS["days"]
-        motion = measure_motion(np.vstack([days, seen[1:]]))
-        if "t" in (recipe.columns or {}) and motion and motion.is_walking:
-            advice = advise(time_unit="days")
-            raise DataError(f"{path}: times look like days of Excel: {advice}")
-        return
-    if not (found.fault or found.irregularity > REGULAR):
+    found = measure_motion(seen := first_rows(rows))
+    fault = found.fault if found else "people are seen too briefly"
+    if found and not fault and found.irregularity <= _REGULAR:
         return
     advice = suggest_reading(seen, recipe)
-    if not (found.fault or advice):
-        return  # people may be seen at irregular times
-    message = f"{path}: {found.fault or 'people are seen at irregular times'}" + (
-        f"; {advice}" if advice else ""
-    )
+    if not advice and not (found and fault):
+        return  # few rows, or people who are seen at irregular times
+    message = f"{path}: {fault or 'people are seen at irregular times'}"
+    message += f"; {advice}" if advice else ""
     if is_unit_given and advice:
         warn(message)
-    elif not is_unit_given and (advice or found.high_speed > FASTEST[1]):
-        if found.median_speed > FASTEST[0]:
+    elif not is_unit_given and (advice or (found and found.high_speed > _FASTEST[1])):
+        if found and found.median_speed > _FASTEST[0]:
             scale = float(f"{_WALK / found.median_speed:.2g}")
             message += f"; if they are pixels in which people walk at {_WALK:g} m/s, {advise(scale=scale)}"
         raise DataError(f"{message}; if people do move like that, {advise(unit='m')}")
+
+
+def check_unit(rows: pl.DataFrame, recipe: Recipe, path: Path) -> None:
+    """Raise DataError where `rows` x, y [m] of file `path`, read with a `recipe`, span an impossible site."""
+    positions, metres = rows.select("x", "y").to_numpy(), recipe.metres or 1.0
+    reach = float(np.abs(positions).max())
+    spread = float(np.ptp(np.quantile(positions, [0.01, 0.99], axis=0), axis=0).max())
+    is_small = metres < 1 and reach < _SITES[0]
+    if is_small or (metres == 1 and spread > _SITES[1]):
+        unit, other = ("m", "mm") if is_small else ("mm", "m")
+        raise DataError(
+            f"{path}: positions span {reach if is_small else spread:.3g} m, read as {recipe.file_format}; if "
+            f"they are in {unit}, {advise(unit=unit)}; if the site is of that size, {advise(unit=other)}"
+        )
 
 
 def is_table_known(recipe: Recipe) -> bool:
@@ -77,17 +168,10 @@ def is_table_known(recipe: Recipe) -> bool:
 def find_implausible(rows: pl.DataFrame) -> list[str]:
     """What people cannot do in `rows` day, id, t [s], x, y [m], sorted by day, id and t, as texts."""
     person = pl.struct("day", "id").rle_id()
-    first = (
-        rows.head(_ROWS)
-        .select("t", person.alias("id"), "x", "y")
-        .to_numpy()
-        .astype(float)
-    )
-    motion, n_jumps, fastest = measure_motion(first.T), 0, 0.0
-    step, moved = (
-        pl.col("t").diff(),
-        (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt(),
-    )
+    first = rows.head(MOST_SHOWN).select("t", person.alias("id"), "x", "y").to_numpy()
+    motion, n_jumps, fastest = measure_motion(first.astype(float).T), 0, 0.0
+    step = pl.col("t").diff()
+    moved = (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
     is_jump = (person.diff() == 0) & (moved > _JUMP + _SPRINT * step)
     for block in rows.iter_slices(
         1 << 20
@@ -102,87 +186,150 @@ def find_implausible(rows: pl.DataFrame) -> list[str]:
     return texts
 
 
-def suggest_reading(seen: np.ndarray, recipe: Recipe) -> str:
-    """Advice for the first reading, other than the `recipe`, in which people walk; empty if there is none.
-
-    The rows t [s], id, x, y [m] were `seen` with the recipe, shape (4, n).
-    """
-    seen = seen[:, np.isfinite(seen).all(axis=0)]
-    if not seen.size:
-        return ""
-    for reading, advice in _readings(seen, recipe):
-        found = measure_motion(reading)
-        if found is not None and found.is_walking:
-            return advice
-    order, columns = find_walking(seen), dict(recipe.columns or {})
-    if order is None or order == (0, 1, 2, 3) or "t" not in columns:
-        return ""
-    names = ("t", "id", "x", "y")
-    exchanged = {names[k]: columns[names[at]] for k, at in enumerate(order) if at != k}
-    if any(isinstance(at, int) for at in columns.values()):
-        exchanged = {name: columns[name] for name in names} | exchanged
-    return f"columns look exchanged: if they are, {advise(columns=exchanged)}"
-
-
-def check_unit(rows: pl.DataFrame, recipe: Recipe, path: Path) -> None:
-    """Raise DataError where `rows` x, y [m] of file `path`, read with a `recipe`, span an impossible site."""
-    positions, metres = rows.select("x", "y").to_numpy(), recipe.metres or 1.0
-    if metres < 1 and (reach := float(np.abs(positions).max())) < _MIN_SITE:
-        raise DataError(
-            f"{path}: positions reach only {reach / metres:.3g}, expected millimetres as in "
-            f"{recipe.file_format}; if they are metres, {advise(unit='m')}; if the site is that small, "
-            f"{advise(unit='mm')}"
-        )
-    low, high = np.quantile(positions, [0.01, 0.99], axis=0)
-    if metres == 1 and (spread := float((high - low).max())) > MAX_SITE:
-        raise DataError(
-            f"{path}: positions spread over {spread:.3g}, expected metres as in {recipe.file_format}; if "
-            f"they are millimetres, {advise(unit='mm')}; if the site is that wide, {advise(unit='m')}"
-        )
-
-
 def first_rows(rows: pl.DataFrame) -> np.ndarray:
     """The first of `rows` as t, id, x, y, shape (4, n)."""
     large = pl.col("id").abs().max() >= 2**53  # floats do not tell such ids apart
     person = pl.when(large).then(pl.col("id").rank("dense")).otherwise("id")
-    return rows.head(_ROWS).select("t", person, "x", "y").to_numpy().astype(float).T
+    return (
+        rows.head(MOST_SHOWN).select("t", person, "x", "y").to_numpy().astype(float).T
+    )
 
 
-def _readings(rows: np.ndarray, recipe: Recipe) -> Iterator[tuple[np.ndarray, str]]:
-    """Other readings of rows (4, n), the likeliest first, each with its advice."""
-    t, person, x, y = rows
-    metres = recipe.metres or 1.0
-    for name, unit in (("millimetres", "mm"), ("centimetres", "cm"), ("feet", "ft")):
-        factor = UNITS[unit] / metres
-        yield (
-            np.array([t, person, x * factor, y * factor]),
-            f"positions look like {name}: {advise(unit=unit)}",
-        )
-    time = (recipe.columns or {}).get("t")
-    if time is not None and recipe.time_unit is None:
-        yield (
-            np.array([t / 1000, person, x, y]),
-            f"times look like milliseconds: {advise(time_unit='ms')}",
-        )
-        if (t % 1 == 0).all():
-            columns = {"frame": time}
-            if isinstance(time, int):
-                columns |= {
-                    name: (recipe.columns or {})[name] for name in ("id", "x", "y")
-                }
-            yield (
-                np.array([t / _FRAMES, person, x, y]),
-                "times look like numbers of frames: name them, and give the frame rate of the video; "
-                f"{_FRAMES:g} is only a guess: {advise(columns=columns, frame_rate=_FRAMES)}",
-            )
-    for one, other, names in (
-        (x, y, "longitude and latitude"),
-        (y, x, "latitude and longitude: exchange the columns x and y, and"),
-    ):
-        if (np.abs(one) <= 180).all() and (np.abs(other) <= 90).all():
-            east, north = one * _DEGREE * np.cos(np.radians(other)), other * _DEGREE
-            origin = [round(float(np.median(values)), 2) for values in (one, other)]
-            yield (
-                np.array([t, person, east, north]),
-                f"positions look like degrees of {names}: {advise(unit='deg', origin=origin)}",
-            )
+# --- other recipes ------------------------------------------------------------------------------------
+
+
+def suggest_reading(seen: np.ndarray, recipe: Recipe) -> str:
+    """Advice for the first change of a `recipe` with which people walk; empty if there is none.
+
+    The rows t [s], id, x, y [m] were `seen` with the recipe, shape (4, n).
+    """
+    seen, columns = seen[:, np.isfinite(seen).all(axis=0)], recipe.columns or {}
+    if not seen.size:
+        return ""
+    quantities = ("t", "id", "x", "y")
+    names = [columns.get(name, name) for name in quantities]
+    if advice := suggest_columns(seen, names, range(4), recipe):
+        return advice
+    order = _find_walking(seen, 4 * [None], [1.0] * 4, is_counted=False)
+    if "t" not in columns or order in (None, [0, 1, 2, 3]):
+        return ""
+    exchanged = dict(zip(quantities, [names[k] for k in order or ()], strict=True))
+    return f"{_LIKE_THIS}: {advise(columns=exchanged)}"
+
+
+def suggest_columns(
+    values: np.ndarray,
+    names: Sequence[str | int],
+    known: Sequence[int | None],
+    recipe: Recipe,
+) -> str:
+    """Advice for the first change of a `recipe` with which people walk; empty if there is none.
+
+    Parameters
+    ----------
+    values : numbers of some columns, shape (m, n).
+    names : of the columns.
+    known : number of the column of t, id, x and y, None where it is unknown.
+    recipe : with the columns that are known.
+    """
+    for change, factors, is_counted in _changes(values, recipe, None not in known):
+        order = _find_walking(values, known, factors, is_counted=is_counted)
+        if order is None:
+            continue
+        quantities = ("frame" if is_counted else "t", "id", "x", "y")
+        columns = {name: names[k] for name, k in zip(quantities, order, strict=True)}
+        if columns.items() <= (recipe.columns or {}).items():
+            if not change:
+                continue
+        else:
+            change = {"columns": columns, **change}
+        rate = f"{_FRAMES:g} frames a second are only a guess: "
+        guess = rate if "frame_rate" in change else ""
+        return f"{_LIKE_THIS}: {guess}{advise(**change)}"
+    return ""
+
+
+def _changes(
+    values: np.ndarray, recipe: Recipe, is_read: bool
+) -> Iterator[tuple[dict[str, Any], list[float], bool]]:
+    """Changes of a `recipe`, the likeliest first.
+
+    Each with the factors of t, id, x and y, and whether t is counted in frames.  With `is_read` the rows of
+    `values` are t [s], id, x, y [m].
+    """
+    is_frame = "frame" in (recipe.columns or {})
+    for is_counted in (not is_read,) if is_frame else (False, True):
+        more = {"frame_rate": _FRAMES} if is_counted and not recipe.frame_rate else {}
+        rate = (recipe.frame_rate or _FRAMES) if is_counted else 1.0
+        for unit in ("m", "mm", "cm", "ft"):
+            factor = UNITS[unit] / (recipe.metres or 1.0)
+            change = more if factor == 1 else {"unit": unit, **more}
+            yield change, [1 / rate, 1, factor, factor], is_counted
+    if is_read and not is_frame and recipe.time_unit is None:
+        for unit in ("ms", "days"):
+            yield {"time_unit": unit}, [TIME_UNITS[unit], 1, 1, 1], False
+    if is_read and (np.abs(values[2]) <= 180).all() and (np.abs(values[3]) <= 90).all():
+        lon, lat = (round(float(np.median(each)), 2) for each in values[2:4])
+        east = _DEGREE * np.cos(np.radians(lat))
+        yield {"unit": DEGREES, "origin": [lon, lat]}, [1, 1, east, _DEGREE], False
+
+
+def _find_walking(
+    values: np.ndarray,
+    known: Sequence[int | None],
+    factors: Sequence[float],
+    *,
+    is_counted: bool,
+) -> list[int] | None:
+    """The columns in which people walk, as t, id, x, y; None where there are none.
+
+    Of several orders, ways are smoothest, t has the most regular clock, and most columns are in place.
+    """
+    found = []
+    free = [k for k in range(len(values)) if k not in known]
+    for choice in permutations(free, known.count(None)):
+        rest = iter(choice)
+        order = [next(rest) if k is None else k for k in known]
+        t, person = values[order[0]], values[order[1]]
+        whole = [person, t] if is_counted else [person]
+        if any((each[np.isfinite(each)] % 1 != 0).any() for each in whole):
+            continue
+        motion = measure_motion(values[order] * np.array(factors)[:, None])
+        if motion is not None and motion.is_walking:
+            n_moved = sum(k != place for place, k in enumerate(order))
+            scores = round(motion.roughness, 1), round(motion.irregularity, 3), n_moved
+            found.append((scores, order))
+    return min(found)[-1] if found else None
+
+
+# --- what a file was read as --------------------------------------------------------------------------
+
+
+def describe_rows(rows: pl.DataFrame, recipe: Recipe, name: str) -> str:
+    """The first of `rows` t [s], id, x, y [m] of a file called `name`, and its `recipe`, in a few lines.
+
+    They say how people move and where, and draw a map.
+    """
+    rows, columns = rows.head(MOST_SHOWN), recipe.columns or {}
+    shown = ", ".join(f"{name} = {at}" for name, at in columns.items())
+    lines = [f"{name} is read as {recipe.file_format}: {shown}"]
+    if rows.height == 0:
+        return lines[0]
+    t, _, x, y = seen = first_rows(rows)
+    first = "first " if rows.height == MOST_SHOWN else ""
+    lines.append(
+        f"{first}{rows.height:,} rows: {rows['id'].n_unique():,} people in {np.ptp(t):,.1f} s"
+    )
+    if (motion := measure_motion(seen)) is not None:
+        speeds = f"speed {motion.median_speed:.2f} m/s (median), {motion.high_speed:.2f} (90 % quantile)"
+        lines.append(f"{speeds}; a person is seen every {motion.interval:.3g} s")
+    (west, east), (south, north) = ((each.min(), each.max()) for each in (x, y))
+    lines.append(
+        f"x {west:.1f} to {east:.1f} m, y {south:.1f} to {north:.1f} m; where people were seen:"
+    )
+    aspect = min((north - south) / max(east - west, 1e-9), 1.0)
+    shape = max(1, round(_MAP * aspect / 2)), _MAP
+    counts = np.histogram2d(y, x, bins=shape)[0][::-1]
+    shares = np.minimum(counts / max(np.quantile(counts, 0.95), 1.0), 1.0)
+    levels = np.ceil(shares * (len(_INK) - 1)).astype(int)
+    return "\n".join([*lines, *("".join(_INK[k] for k in row) for row in levels)])

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -21,21 +21,20 @@ from ..core.errors import DataError, warn
 from ..core.input_files import printable
 from . import funnels
 from .plausibility import (
+    MOST_SHOWN,
     check_people,
     check_unit,
+    describe_rows,
     find_implausible,
     first_rows,
     is_table_known,
     suggest_reading,
 )
 from .recipe import Recipe, advise, find_recipe
-from .recordings import LoadedFile, file_stem, separate_recordings
 from .rows import (
     EXPECTED,
     FARTHEST,
     LAST_SECOND,
-    MISPLACED,
-    MISSING,
     Rows,
     load_rows,
     open_source,
@@ -44,6 +43,8 @@ from .rows import (
 from .shapes import SHAPES, require_format
 from .sources import is_table, open_table, require_memory, unpacked
 
+# why a row is rejected
+MISSING, NO_ID = "missing or not a number", "id not a whole number"
 MAX_REJECTED = 0.05
 """Share of the rows of a file that may be unusable, unless a `Recipe` gives another (assumed)."""
 MOST_DOUBLED = 0.2
@@ -52,6 +53,36 @@ MOST_DOUBLED = 0.2
 CALENDAR_BEGINS = 1e8
 _DAY, _MINUTE = 86_400, 60  # [s]
 _HEAD = 1 << 16  # bytes of a text by which its day is found
+
+# A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
+# distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
+_FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
+
+
+class LoadedFile(NamedTuple):
+    """A file that has been read.
+
+    Attributes
+    ----------
+    path : the file.
+    rows : its usable rows: day, id, t [s], x, y [m].
+    stages : its funnel.
+    recipe : how it was read, with its columns.
+    """
+
+    path: Path
+    rows: pl.DataFrame
+    stages: list[dict[str, Any]]
+    recipe: Recipe
+
+    @property
+    def is_sequence(self) -> bool:
+        """Whether each file of this shape is a recording of its own, without a calendar."""
+        return SHAPES[self.recipe.file_format or "tidy"].is_sequence
+
+    def with_day(self, day: pl.Expr) -> LoadedFile:
+        """The same rows under another `day`."""
+        return self._replace(rows=self.rows.with_columns(day=day))
 
 
 def read_raw(
@@ -223,7 +254,7 @@ def _accept(rows: Rows, path: Path, recipe: Recipe) -> LoadedFile:
 def open_file(path: Path, recipe: Recipe) -> Iterator[tuple[Recipe, pl.LazyFrame]]:
     """Open file `path` without reading it as a whole, where its shape allows that.
 
-    Gives the `recipe` completed by the file, and a scan of its rows: line, ragged, t [s], id, exact_id, x, y
+    Gives the `recipe` completed by the file, and a scan of its rows: line, ragged, t [s], id, x, y
     [m], and, where the file has it, speed [m/s].  Raises DataError where the file cannot be read.
     """
     with unpacked(path) as plain:
@@ -232,6 +263,14 @@ def open_file(path: Path, recipe: Recipe) -> Iterator[tuple[Recipe, pl.LazyFrame
             return
         rows = load_rows(*open_source(plain, path, recipe), path)
         yield rows.recipe, rows.table.lazy()
+
+
+def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:
+    """A description of file `path`, read with a `recipe`, by its first rows; and this recipe, completed."""
+    with open_file(path, recipe) as (found, scan):
+        usable = scan.filter(rejection_reason(scan).is_null())
+        rows = usable.head(MOST_SHOWN).select("t", "id", "x", "y").collect()
+    return describe_rows(rows, found, path.name), found
 
 
 def is_streamed(path: Path, recipe: Recipe) -> bool:
@@ -266,14 +305,14 @@ def find_day(path: Path, recipe: Recipe) -> str | None:
 
 def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
     """Why a row of a `table` as from `open_file` is rejected; null where it is usable."""
-    numbers = pl.col("t", "id", "x", "y")
+    numbers = pl.col("t", "x", "y")
     reasons = {
         "missing or extra fields": pl.col("ragged"),
         MISSING: pl.any_horizontal(numbers.is_null()),
+        NO_ID: pl.col("id").is_null(),
         "not finite": ~pl.all_horizontal(numbers.is_finite()),
-        "id not a whole number": pl.col("exact_id").is_null(),
         "time not in seconds since 1970": pl.col("t").abs() > LAST_SECOND,
-        MISPLACED: pl.max_horizontal(pl.col("x", "y").abs()) > FARTHEST,
+        "position not on Earth": pl.max_horizontal(pl.col("x", "y").abs()) > FARTHEST,
     }
     if "day" in table.collect_schema():
         reasons["no day"] = pl.col("day").is_null()
@@ -294,10 +333,10 @@ def reject_rows(
     bad = marked.filter(pl.col("reason").is_not_null())
     counts = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     first = bad.select("line", "reason").row(0) if bad.height else None
-    if first and first[1] == MISSING and rows is not None:
-        name = next(name for name in ("t", "id", "x", "y") if bad[name][0] is None)
-        first = (first[0], f"{MISSING} ({rows.show_field(first[0], name)})")
-    good = marked.filter(pl.col("reason").is_null()).with_columns(id="exact_id")
+    if first and first[1] in (MISSING, NO_ID) and rows is not None:
+        name = next(name for name in ("t", "x", "y", "id") if bad[name][0] is None)
+        first = (first[0], f"{first[1]} ({rows.show_field(first[0], name)})")
+    good = marked.filter(pl.col("reason").is_null())
     return good.drop("reason"), counts, first
 
 
@@ -379,3 +418,125 @@ def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
     )
     if counts:
         warn(f"{where}: rejected rows: {counts}")
+
+
+# --- several files ------------------------------------------------------------------------------------
+
+
+def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
+    """Give different recordings among `files` another `day`, so that no person is in two of them.
+
+    Files without a calendar (see `to_metres`) are recordings of their own, called by their names, unless
+    people continue from one to the other, as in pieces of one recording (not for EWAP).  Files of a calendar
+    day are its pieces.  If most of the people in both of two files are in two places at once, the files are
+    separate recordings after all, with a DataWarning; if only some are, a DataError is raised.
+    """
+    found = list(files)
+    if len(files) < 2:
+        return found
+    check_names([file_stem(file.path) for file in files if file.is_sequence])
+    names = name_recordings([file.path for file in files])
+    has_text_day = [file.rows["day"].dtype == pl.String for file in files]
+    is_named = [
+        is_text and file.rows["day"].unique().to_list() == [file_stem(file.path)]
+        for file, is_text in zip(files, has_text_day, strict=True)
+    ]
+    candidates = [
+        file.rows.with_columns(day=pl.lit(""))
+        if named and not file.is_sequence
+        else file.rows.head(0)
+        for file, named in zip(files, is_named, strict=True)
+    ]
+    joined = {
+        (j, k) for j, k, _, n_apart, _ in _find_shared_people(candidates) if not n_apart
+    }
+    for k in (k for k, named in enumerate(is_named) if named):
+        first = next((j for j in range(k) if (j, k) in joined), None)
+        found[k] = files[k].with_day(
+            pl.lit(names[k] if first is None else found[first].rows["day"][0])
+        )
+    for j, k, n_together, n_apart, example in _find_shared_people(
+        [file.rows for file in found]
+    ):
+        where = f"{printable(files[j].path.name)} and {printable(files[k].path.name)}"
+        if n_apart and (n_apart <= n_together or has_text_day[k]):
+            raise DataError(
+                f"{where}: person {example} is in two places at once ({n_apart} of {n_together + n_apart} "
+                "people in both files are); read these files one by one, or correct them"
+            )
+        if n_apart:
+            warn(
+                f"{where}: {n_apart} people are in two places at once; read as two recordings"
+            )
+            found[k] = files[k].with_day(
+                pl.format("{} {}", pl.col("day").cast(pl.String), pl.lit(names[k]))
+            )
+    return found
+
+
+def _find_shared_people(
+    parts: Sequence[pl.DataFrame],
+) -> list[tuple[int, int, int, int, int]]:
+    """Pairs of files that share people.
+
+    For each: the numbers of both files, how many people continue from one to the other, how many are in two
+    places at once, and one of the latter.
+    """
+    keys = [pl.col("day").cast(pl.String), pl.col("id", "t", "x", "y")]
+    rows = pl.concat(
+        [part.select(*keys, file=pl.lit(k, pl.Int32)) for k, part in enumerate(parts)]
+    )
+    rows = rows.filter((pl.col("file").min() != pl.col("file").max()).over("day", "id"))
+    rows = rows.sort("day", "id", "t", "file")
+    step = [
+        pl.col(name).diff().over("day", "id").alias(f"d{name}")
+        for name in ("t", "x", "y", "file")
+    ]
+    steps = rows.with_columns(step).filter(
+        (pl.col("dfile") != 0) & (pl.col("dt") <= _SOON)
+    )
+    before = pl.col("file") - pl.col("dfile")
+    steps = steps.with_columns(
+        j=pl.min_horizontal("file", before),
+        k=pl.max_horizontal("file", before),
+        apart=(pl.col("dx") ** 2 + pl.col("dy") ** 2).sqrt()
+        > _BLUR + _FASTEST * pl.col("dt"),
+    )
+    people = (
+        steps.group_by("j", "k", "day", "id")
+        .agg(pl.col("apart").any())
+        .sort("j", "k", "apart", "day", "id")
+    )
+    found = people.group_by("j", "k", maintain_order=True).agg(
+        (~pl.col("apart")).sum().alias("together"),
+        pl.col("apart").sum(),
+        pl.col("id").last(),
+    )
+    return list(found.iter_rows())
+
+
+def name_recordings(files: Sequence[Path]) -> list[str]:
+    """A name for each of `files`: without its ending, with its folder where two files have the same name."""
+    names = [file_stem(file) for file in files]
+    names = [
+        f"{file.parent.name}-{name}" if names.count(name) > 1 else name
+        for file, name in zip(files, names, strict=True)
+    ]
+    return [
+        f"{n} ({names[:k].count(n) + 1})" if n in names[:k] else n
+        for k, n in enumerate(names)
+    ]
+
+
+def file_stem(path: Path) -> str:
+    """The name of file `path` without its endings."""
+    return path.name.split(".")[0]
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Raise DataError where two files of one name in `names` would become one day."""
+    if doubled := sorted({name for name in names if names.count(name) > 1}):
+        raise DataError(
+            f"several files are called {', '.join(doubled)}: their people would be mixed; "
+            "pass each file once, and rename those that are other recordings"
+        )

@@ -12,7 +12,14 @@ import numpy as np
 import polars as pl
 
 from ..core.errors import DataError
-from .columns import ask_about_recordings, column_of, find_columns
+from .columns import (
+    ask_about_recordings,
+    column_of,
+    find_columns,
+    to_ids,
+    to_numbers,
+    to_times,
+)
 from .recipe import DEGREES, Recipe, advise
 from .shapes import ATC_YEAR, SHAPES, Shape, recognise
 from .sources import (
@@ -23,17 +30,12 @@ from .sources import (
     read_head,
     read_text,
 )
-from .values import require_distinct_ids, scale_times, to_ids, to_numbers, to_times
 
 EXPECTED = (
     "expected a table (text, Parquet, Feather, SQLite, JSON lines) with columns t or frame, id, x, y; or one "
     f"of {', '.join(name for name in SHAPES if name != 'tidy')}; plain, .gz or .zip"
 )
 """What can be read, for error messages."""
-MISSING, MISPLACED = (
-    "missing or not a number",
-    "position not on Earth",
-)  # why a row is rejected
 LAST_SECOND = (
     4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
 )
@@ -48,7 +50,7 @@ class Rows:
 
     Attributes
     ----------
-    table : line, ragged, t [s], id, exact_id, x, y [m], and day, where the file tells it.
+    table : line, ragged, t [s], id, x, y [m], and day, where the file tells it.
     recipe : how the file was read, with its columns.
     source : the columns of the file; None where it was streamed.
     """
@@ -173,22 +175,18 @@ def load_rows(
         "line", offset=source.first_line
     )
     t, day = _read_times(values, recipe, source, path)
-    ids, numbers = (
-        to_ids(values["id"]),
-        {k: to_numbers(values[k], source.decimal) for k in ("x", "y")},
-    )
-    require_distinct_ids(ids, source.where)
+    ids = to_ids(values["id"], source.where)
+    numbers = {
+        name: to_numbers(values[name], source.decimal)
+        for name in ("x", "y", "speed")
+        if name in values
+    }
     if day is None and "day" in values:
         text = values["day"].cast(pl.String).str.strip_chars(' "')
         day = text.set(text == "", None)
     elif not is_head and recipe.file_format == "tidy":
         ask_about_recordings(source, recipe, t, ids, by_name=not is_told)
-    if "speed" in values:
-        numbers["speed"] = to_numbers(values["speed"], source.decimal)
-    table = _with_exact_ids(
-        table.with_columns(t, ids.alias("id"), **numbers).lazy()
-    ).collect()
-    table = to_metres(table, recipe, path)
+    table = to_metres(table.with_columns(t, id=ids, **numbers), recipe, path)
     if day is not None:
         table = table.with_columns(day=day)
     if recipe.where:
@@ -201,20 +199,13 @@ def _read_times(
     values: dict[str, pl.Series], recipe: Recipe, source: Source, path: Path
 ) -> tuple[pl.Series, pl.Series | None]:
     """The times [s]; and the local date of each, where the file states its zone."""
-    tz, decimal = recipe.tz or "UTC", source.decimal
     if "frame" in values:
-        frames = to_numbers(values["frame"], decimal)
+        frames = to_numbers(values["frame"], source.decimal)
         return (frames * (1 / (recipe.frame_rate or 1.0))).alias("t"), None
-    if recipe.time_unit and 2 * to_numbers(values["t"], decimal).null_count() <= len(
-        values["t"]
-    ):
-        times = scale_times(values["t"], recipe.time_unit, tz, decimal)
-    else:
-        times = to_times(values["t"], tz, decimal)
-    t = times.seconds.alias("t")
+    t, day = to_times(values["t"], recipe.tz or "UTC", recipe.time_unit, source.decimal)
     if recipe.file_format == "atc-1hz":
         t = t + _midnight(path, t)
-    return t, times.day if recipe.tz is None and "day" not in values else None
+    return t.alias("t"), day if recipe.tz is None and "day" not in values else None
 
 
 def _midnight(path: Path, t: pl.Series) -> float:
@@ -273,8 +264,10 @@ def scan_streamed(
         return None
     recipe = replace(recipe.over(shape.recipe), file_format=shape.name)
     n, columns = shape.n_fields, recipe.columns or {}
-    numbers = {at for name, at in columns.items() if name != "id"}
-    schema = {f"f{k}": pl.Float64 if k in numbers else pl.String for k in range(n)}
+    types = {
+        at: pl.Int64 if name == "id" else pl.Float64 for name, at in columns.items()
+    }
+    schema = {f"f{k}": types.get(k, pl.String) for k in range(n)}
     scan = pl.scan_csv(
         plain, schema={**schema, "extra": pl.String}, has_header=False, separator=shape.separator,
         quote_char=None, encoding="utf8-lossy", ignore_errors=True, truncate_ragged_lines=True,
@@ -289,17 +282,4 @@ def scan_streamed(
         else pl.col(f"f{at}")
         for name, at in columns.items()
     }
-    return recipe, _with_exact_ids(scan.select("line", ragged=ragged, **named))
-
-
-def _with_exact_ids(scan: pl.LazyFrame) -> pl.LazyFrame:
-    """The `scan` with column id as floats, and exact_id: an integer, or null where id does not tell it."""
-    number, text = (
-        pl.col("id").cast(pl.Float64, strict=False),
-        pl.col("id").cast(pl.Int64, strict=False),
-    )
-    whole = pl.when((number == number.floor()) & (number.abs() < 2.0**53)).then(number)
-    texts = scan.with_columns(pl.col("id").cast(pl.String).str.strip_chars_start())
-    return texts.with_columns(
-        id=number, exact_id=pl.coalesce(text, whole.cast(pl.Int64, strict=False))
-    )
+    return recipe, scan.select("line", ragged=ragged, **named)

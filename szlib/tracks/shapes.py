@@ -31,7 +31,6 @@ from .sources import (
     read_text,
     split_line,
 )
-from .values import to_numbers
 
 # Central square of the ATC mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues).
 ATC_AREA = ((-18.5, -7.5), (-10.0, 8.0))
@@ -160,9 +159,8 @@ def _parse_ewap(plain: Path, path: Path, recipe: Recipe) -> Parsed:
     """EWAP counts frames: their rate follows from the displacement in a frame, and the velocity."""
     source, given = open_text(plain, f"{path}", has_header=False), recipe.frame_rate
     columns = {"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
-    rows = pl.DataFrame(
-        {name: to_numbers(source.column(k)) for name, k in columns.items()}
-    )
+    texts = pl.DataFrame({name: source.column(k) for name, k in columns.items()})
+    rows = texts.cast(pl.Float64, strict=False)
     rows = rows.filter(pl.all_horizontal(pl.all().is_finite())).sort("id", "frame")
     steps = rows.select(
         pl.col("frame", "x", "y").diff().over("id"),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import codecs
 import csv
+import errno
 import gzip
 import io
 import json
+import shutil
 import sqlite3
 import zipfile
 import zlib
@@ -32,6 +34,7 @@ from ..core.input_files import printable, readable_path, unchanged_files
 LONGEST_LINE = 100_000
 UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _BYTES = 6  # memory for each byte of a text while it is read (measured: 5.8 with its columns)
+_RESERVE = 0.02  # share of a disk that unpacking leaves free
 _ROWS_AT_ONCE = 4096  # rows of a table that are read before its size is checked
 
 
@@ -130,7 +133,7 @@ def _find_member(plain: Path, path: Path) -> str | None:
 def unpack(plain: Path, path: Path, target: Path, member: str | None = None) -> None:
     """Unpack the gzipped file `plain`, given as `path`, or a `member` of a zip archive, into `target`.
 
-    Failure to read means damage, failure to write a lack of room.
+    Failure to read means damage, failure to write a lack of room.  The disk is never filled.
     """
     try:
         with closing(
@@ -143,6 +146,9 @@ def unpack(plain: Path, path: Path, target: Path, member: str | None = None) -> 
             )
             with source, target.open("wb") as unpacked:
                 while block := source.read(1 << 22):
+                    disk = shutil.disk_usage(target.parent)
+                    if disk.free < _RESERVE * disk.total:
+                        raise OSError(errno.ENOSPC, "the disk is nearly full")
                     unpacked.write(block)
     except (
         EOFError,

@@ -285,7 +285,7 @@ def _inspect(options: argparse.Namespace) -> int:
     from ..encounters.settings import EncounterSettings
     from ..tracks import datasets, funnels
     from ..tracks.clock import read_tracks
-    from ..tracks.quality import describe_file, find_reading
+    from ..tracks.readers import describe_file
     from ..tracks.recipe import FILE_NAME, Recipe, arguments
 
     files = datasets.find([options.file])
@@ -295,7 +295,8 @@ def _inspect(options: argparse.Namespace) -> int:
         )
     reading = Recipe(**_read_options(options, options.file))
     advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
-    print(describe_file(files[0], reading))
+    description, found = describe_file(files[0], reading)
+    print(description)
     with warnings.catch_warnings(
         action="ignore", category=DataWarning
     ):  # the table shows the same counts
@@ -312,7 +313,6 @@ def _inspect(options: argparse.Namespace) -> int:
     if advice:
         print(advice)
     if options.save is not None:
-        found = find_reading(files[0], reading)
         if "area" in samples.attrs:
             found = replace(found, area=samples.attrs["area"])
         print(

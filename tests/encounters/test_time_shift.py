@@ -12,8 +12,7 @@ import szlib
 from szlib.core.errors import DataError
 from szlib.encounters.time_shift import COMPANION_SEPARATION, ShiftableTracks
 from szlib.tracks import funnels
-from szlib.tracks.clock import nearest_tick
-from szlib.tracks.interop import check_tracks
+from szlib.tracks.clock import check_tracks, nearest_tick
 
 MINUTES = (1.0, 5.0)
 

@@ -14,7 +14,7 @@ from studies import sites
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.interop import check_tracks
+from szlib.tracks.clock import check_tracks
 
 # --- Grand Central -----------------------------------------------------------------------------------
 

@@ -16,8 +16,7 @@ from helpers.track_tables import make_crowd
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.clock import to_clock
-from szlib.tracks.interop import check_tracks
+from szlib.tracks.clock import check_tracks, to_clock
 from szlib.tracks.readers import read_raw
 
 

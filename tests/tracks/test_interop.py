@@ -12,8 +12,7 @@ from helpers.track_tables import make_crowd, make_tracks, make_walk
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.clock import COLUMNS, to_clock
-from szlib.tracks.interop import check_tracks, to_pedpy
+from szlib.tracks.clock import COLUMNS, check_tracks, to_clock, to_pedpy
 
 
 @pytest.mark.parametrize("name", WRITERS)

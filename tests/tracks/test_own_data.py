@@ -157,7 +157,8 @@ def test_columns_are_suggested_also_where_only_names_or_speeds_tell_the_unit() -
         x=lambda r: r["x"] * 1e3, y=lambda r: r["y"] * 1e3
     )
     for names, options in (
-        (["when", "who", "east (mm)", "north (mm)"], {}), (["when", "who", "east", "north"], {"unit": "mm"}),
+        (["when", "who", "east (mm)", "north (mm)"], {"unit": "mm"}),
+        (["when", "who", "east", "north"], {"unit": "mm"}),
     ):  # fmt: skip
         columns = dict(zip(("t", "id", "x", "y"), names, strict=True))
         advice = " and ".join(
@@ -165,7 +166,7 @@ def test_columns_are_suggested_also_where_only_names_or_speeds_tell_the_unit() -
             for name, value in {"columns": columns, **options}.items()
         )
         table = rows.set_axis(names, axis=1)
-        with pytest.raises(szlib.DataError, match=re.escape(f"; pass {advice}")):
+        with pytest.raises(szlib.DataError, match=re.escape(f": pass {advice}")):
             read_raw(table)
         assert len(
             read_raw(table, recipe=szlib.Recipe(columns=columns, **options))
@@ -175,7 +176,8 @@ def test_columns_are_suggested_also_where_only_names_or_speeds_tell_the_unit() -
 UNCLEAR = {
     "time, timestamp can all be t; pass columns={'t': 'time'}": ["time", "id", "x", "y", "timestamp"],
     "names x twice; rename one": ["t", "id", "x", "y", "x"],
-    "has no column y; people walk if these are {'t': 't', 'id': 'id', 'x': 'x', 'y': 'north'}": [
+    "has no column y; people walk if it is read like this: pass columns={'t': 't', 'id': 'id', 'x': 'x', "
+    "'y': 'north'}": [
         "t", "id", "x", "north", "note",
     ],
 }  # fmt: skip

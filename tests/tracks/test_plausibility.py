@@ -42,30 +42,25 @@ def frames() -> pd.DataFrame:
 
 
 SPOILED = {
-    "millimetres: pass unit='mm'": lambda: table().assign(
+    "pass unit='mm'": lambda: table().assign(
         x=lambda t: t["x"] * 1e3, y=lambda t: t["y"] * 1e3
     ),
-    "centimetres: pass unit='cm'": lambda: table().assign(
+    "pass unit='cm'": lambda: table().assign(
         x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2
     ),
-    "feet: pass unit='ft'": lambda: walkers(1.0 / 0.3048),
-    "milliseconds: pass time_unit='ms'": lambda: table().assign(
-        t=lambda t: t["t"] * 1e3
-    ),
-    "25 is only a guess: pass columns={'frame': 't'} and frame_rate=25": frames,
-    "longitude and latitude": lambda: table().assign(
+    "pass unit='ft'": lambda: walkers(1.0 / 0.3048),
+    "pass time_unit='ms'": lambda: table().assign(t=lambda t: t["t"] * 1e3),
+    "only a guess: pass columns={'frame': 't', 'id': 'id', 'x': 'x', 'y': 'y'} and frame_rate=25": frames,
+    "pass unit='deg' and origin=[135.5, 34.7]": lambda: table().assign(
         x=lambda t: 135.5 + t["x"] / 90_000, y=lambda t: 34.7 + t["y"] / 111_000
     ),
-    "latitude and longitude": lambda: table().assign(
-        x=lambda t: 34.7 + t["y"] / 111_000, y=lambda t: 135.5 + t["x"] / 90_000
-    ),
-    "columns={'t': 'id', 'id': 't'}": lambda: table().rename(
+    "columns={'t': 'id', 'id': 't', 'x': 'x', 'y': 'y'}": lambda: table().rename(
         columns={"t": "id", "id": "t"}
     ),
-    "columns={'t': 'x', 'x': 't'}": lambda: table().rename(
+    "columns={'t': 'x', 'id': 'id', 'x': 't', 'y': 'y'}": lambda: table().rename(
         columns={"t": "x", "x": "t"}
     ),
-    "columns={'t': 'y', 'y': 't'}": lambda: table().rename(
+    "columns={'t': 'y', 'id': 'id', 'x': 'x', 'y': 't'}": lambda: table().rename(
         columns={"t": "y", "y": "t"}
     ),
 }
@@ -98,7 +93,7 @@ def test_the_suggestion_for_frames_gives_the_right_table() -> None:
 
 
 def test_implausible_files_are_refused_like_tables(tmp_path: Path) -> None:
-    spoiled = SPOILED["centimetres: pass unit='cm'"]()
+    spoiled = SPOILED["pass unit='cm'"]()
     spoiled.to_csv(tmp_path / "hall.csv", index=False)
     with pytest.raises(
         szlib.DataError, match=r"hall\.csv: people move at .* m/s .* pass unit='cm'"
@@ -129,7 +124,9 @@ def test_exchanged_columns_of_a_file_without_header_are_named_by_number(
 ) -> None:
     wrong = table().assign(v=1.0, a=0.1)[["id", "t", "x", "y", "v", "a"]]
     wrong.to_csv(tmp_path / "a.csv", index=False, header=False)
-    with pytest.raises(szlib.DataError, match="people walk if these are") as error:
+    with pytest.raises(
+        szlib.DataError, match="people walk if it is read like this"
+    ) as error:
         read_raw(tmp_path / "a.csv")
     columns = eval(re.search(r"columns=(\{.*?\})", str(error.value))[1])
     assert columns == {"t": 1, "id": 0, "x": 2, "y": 3}
@@ -140,7 +137,7 @@ def test_exchanged_columns_of_a_file_without_header_are_named_by_number(
 
 
 def test_an_implausible_given_unit_warns() -> None:
-    spoiled = SPOILED["centimetres: pass unit='cm'"]()
+    spoiled = SPOILED["pass unit='cm'"]()
     with pytest.warns(szlib.DataWarning, match="people move at"):
         assert len(read_raw(spoiled, recipe=szlib.Recipe(unit="m"))) == len(spoiled)
 

@@ -256,7 +256,7 @@ def test_a_bad_row_is_rejected_with_a_warning_that_gives_its_line(
         re.sub(r" \(column .*?\)", "", message)
         == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
     )
-    assert ("holds" in message) == (reason == "missing or not a number")
+    assert ("holds" in message) == ("not a " in reason)
     assert stage_of(frame, "read") == {
         "stage": "read a.csv",
         "entered": len(GOOD) + 2,
@@ -369,9 +369,9 @@ UNUSABLE: dict[str, tuple[str | bytes, str]] = {
     "milliseconds": (as_1hz(samples()).replace(".", ""), "has no column t, id, x, y"),
     "days since 1970": ("t,id,x,y\n15637000000,7,5,5\n", "line 2: time not in seconds since 1970"),
     "places as names": ("t,id,x,y\n1,1,door,5\n2,1,5,6\n3,1,in,\n", "a number (column 'x' holds 'door')"),
-    "metres in a raw file": (as_raw(scaled(1e-3)), "if they are metres, pass unit='m'; if the site"),
+    "metres in a raw file": (as_raw(scaled(1e-3)), "if they are in m, pass unit='m'; if the site"),
     "millimetres, 1 Hz": (as_1hz(scaled(1e3)), "unit='mm'"),
-    "millimetres, EWAP": (as_ewap(scaled(1e3)), "if they are millimetres, pass unit='mm'; if"),
+    "millimetres, EWAP": (as_ewap(scaled(1e3)), "if they are in mm, pass unit='mm'; if"),
     "millimetres, tidy": (as_tidy(scaled(1e3)), "unit='mm'"),
     "PNG": (PNG + bytes(range(256)) * 9, "line 1"),
     "HTML": ("<!doctype html>\n<html><body>404</body></html>\n", "line 1"),
@@ -511,14 +511,14 @@ def test_streamed_people_whose_ids_are_too_large_for_floats_stay_two(
 def test_ids_that_are_not_exact_are_rejected_by_line(tmp_path: Path, text: str) -> None:
     lines = [*GOOD, f"{BEGIN + 40},{text},5,5,1.2,0.1"]
     frame, message = read_quietly(write(tmp_path / "a.csv", "\n".join(lines)))
-    assert (
-        message == "a.csv, first at line 61: rejected rows: 1 x id not a whole number"
-    )
+    expected = f"line 61 (column id holds '{text}'): rejected rows: 1 x id not a whole"
+    assert expected in message
     assert len(frame) == 60
     floats = LARGE.assign(id=LARGE["id"].astype(float))
     floats.to_parquet(tmp_path / "a.parquet")
     with pytest.raises(
-        szlib.DataError, match="line 1: id not a whole number; 40 of 40 rows"
+        szlib.DataError,
+        match=r"line 1: id not a whole number \(column 'id'\); 40 of 40 rows",
     ):
         read_raw(tmp_path / "a.parquet")
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import gzip
 import os
+import shutil
 import signal
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pyarrow as pa
@@ -134,6 +136,12 @@ def test_a_full_temporary_folder_is_not_reported_as_damage(
     (full / "unpacked").symlink_to("/dev/full")
     with pytest.raises(StorageError, match=r"no room to unpack it .*No space left"):
         unpack(packed, packed, full / "unpacked")
+    monkeypatch.setattr(
+        shutil, "disk_usage", lambda _: SimpleNamespace(free=1, total=99)
+    )
+    with pytest.raises(StorageError, match="the disk is nearly full"):
+        unpack(packed, packed, tmp_path / "unpacked")
+    monkeypatch.undo()
     with pytest.raises(szlib.DataError, match=r"damaged \.gz"):
         (tmp_path / "cut.gz").write_bytes(packed.read_bytes()[:-30])
         cut = tmp_path / "cut.gz"
