@@ -29,3 +29,10 @@ from .quality import (
 from .readers import read_raw
 from .recipe import Recipe
 from .sites import read_edinburgh, read_grand_central, read_magni, read_magni_groups
+
+__all__ = [
+    "Recipe", "check_tracks", "clock_index", "count_visits_by_hour", "datasets",
+    "funnels", "measure_frame_intervals", "read_edinburgh", "read_grand_central",
+    "read_groups", "read_magni", "read_magni_groups", "read_raw", "read_tracks",
+    "summarise_people", "summarise_seconds", "to_clock", "to_pedpy",
+]  # fmt: skip
