@@ -416,7 +416,6 @@ def test_a_step_names_a_half_plane():
 def test_an_obstacle_goes_through_run_log_and_figures(obstacle, kind, tmp_path: File):
     """A half-plane, and a kind that szlib does not know: only the class is written."""
     import matplotlib.pyplot as plt
-
     import plots
 
     walls, person = [((-6.0, 2.5), (6.0, 2.5))], szlib.Person((5.0, 0.8), (-0.6, 0.1))

@@ -149,9 +149,7 @@ MAPS = {
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
     "zones": lambda f: figures.plot_zones(f("zone").ellipses),
     "ellipse": lambda f: plots.plot_distance(ZONE),
-    "segment": lambda f: plots.plot_distance(
-        (np.array([-1.0, 0]), np.array([1.0, 0]))
-    ),
+    "segment": lambda f: plots.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
     "scenario": lambda f: figures.plot_scenario(f("log")),
     "step": lambda f: plots.plot_step(f("step")),
     "robot paths": lambda f: plots.plot_robot_paths({"a": f("log"), "b": f("log")}),
