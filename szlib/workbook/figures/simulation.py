@@ -144,7 +144,7 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
 
 
 def draw_scenery(ax: Axes, scenario: Scenario) -> None:
-    """Draw what does not move, within the limits of `ax`: walls, other obstacles, and the goal."""
+    """Draw what stands still in a `scenario`, within the limits of `ax`: walls, other obstacles, the goal."""
     for obstacle in scenario.fixed:
         draw_obstacle(ax, obstacle)
     ax.plot(
@@ -158,6 +158,7 @@ def draw_scenery(ax: Axes, scenario: Scenario) -> None:
 
 
 def draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
+    """Draw the outline of a `zone` on `ax` in a `colour`."""
     (a, b), angle = zone.semi_axes, np.degrees(zone.angle)
     patch = EllipsePatch(
         zone.center, 2 * a, 2 * b, angle=angle, fill=False, edgecolor=colour, lw=1.6
@@ -166,7 +167,7 @@ def draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
 
 
 def draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[Artist]:
-    """Draw robot, zones and people at one time."""
+    """Draw people, zones and the robot on `ax` at a `row` of a `run`; `robot` and `zone` are colours."""
     drawn = [
         draw_zone(ax, ellipse, zone)
         for ellipse in place_zones(run.zones, run.people[row])
@@ -202,7 +203,7 @@ def _write_times(
 
 
 def set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
-    """Set limits that hold the paths, the goal, and the zones in the rows shown of each run.
+    """Set limits of `ax` that hold the paths, the goal, and the zones in the rows `shown` of each run.
 
     Much longer walls (`_WALL_EXTENT`) are cut off.
     """
