@@ -26,8 +26,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
-from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -36,15 +34,6 @@ from ..core import memory
 from ..core.errors import DataError, DataWarning, SzlibError
 from ..core.input_files import printable
 
-# Packages of the extra `workbook`, which the commands `run` and `report` need.
-_WORKBOOK_PACKAGES = (
-    "anywidget",
-    "ipykernel",
-    "jupytext",
-    "latex2mathml",
-    "nbconvert",
-    "papermill",
-)
 _STOPPED = "stopped; finished results stay in their folder"
 # Errors of standard output or standard error that is full or closed.
 _BROKEN_STREAM = (OSError, ValueError)
@@ -80,18 +69,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
-class _CommandParser(argparse.ArgumentParser):
-    """A parser whose help may end with a text that is made when the help is printed."""
-
-    list_parameters: Callable[[], str] | None = None
-
-    def format_help(self) -> str:
-        """The help, and the list of parameters if there is one."""
-        return super().format_help() + (
-            f"\n{self.list_parameters()}\n" if self.list_parameters else ""
-        )
-
-
 def build_parser() -> argparse.ArgumentParser:
     """Build the parser of the command line from `commands.toml`, which describes each command."""
     content = tomllib.loads(
@@ -103,13 +80,13 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     parser.set_defaults(memory=None)
-    groups = {name: _CommandParser(add_help=False) for name in content["groups"]}
+    groups = {
+        name: argparse.ArgumentParser(add_help=False) for name in content["groups"]
+    }
     for name, group in groups.items():
         one = group.add_mutually_exclusive_group() if name == "area" else group
         _add_arguments(one, content["groups"][name])
-    commands = parser.add_subparsers(
-        required=True, metavar="COMMAND", parser_class=_CommandParser
-    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, each in content["commands"].items():
         parents = [groups[group] for group in each.get("groups", ())]
         command = commands.add_parser(
@@ -120,7 +97,6 @@ def build_parser() -> argparse.ArgumentParser:
     run = commands.choices["run"]
     run.set_defaults(jobs=min(os.cpu_count() or 1, 4))
     run.description, _, run.epilog = str(inspect.getdoc(_run)).partition("\n\n")
-    run.list_parameters = partial(_list_parameters, content["parameters"])
     return parser
 
 
@@ -196,7 +172,6 @@ def _run(options: argparse.Namespace) -> int:
         parameters["has_walls"] = True
     if reading := _read_options(options, options.data):
         parameters["reading"] = reading
-    _require_workbook_packages()
     from .folders import require_place
     from .runner import run
     from .summary import format_summary, write_junit
@@ -224,15 +199,6 @@ def _run(options: argparse.Namespace) -> int:
         names, error = ", ".join(refused), next(iter(refused.values()))
         raise SzlibError(f"{names}: could not be run: {error}; finished results stay")
     return 0 if summary["passed"] else 1
-
-
-def _list_parameters(meanings: dict[str, str]) -> str:
-    """The parameters of the notebooks; `meanings` are those of parameters without a comment."""
-    from . import folders
-
-    return folders.describe_parameters(
-        folders.list_notebooks(folders.find_notebooks()), meanings
-    )
 
 
 def _notebooks(options: argparse.Namespace) -> int:
@@ -341,14 +307,6 @@ def _fit(options: argparse.Namespace) -> int:
     return 0
 
 
-def _require_workbook_packages() -> None:
-    """Raise SzlibError if a package is missing that executes the notebooks."""
-    if missing := [name for name in _WORKBOOK_PACKAGES if find_spec(name) is None]:
-        raise SzlibError(
-            f"the notebooks need {', '.join(missing)}: pip install 'szlib[workbook]'"
-        )
-
-
 def _parse_parameter(text: str) -> tuple[str, Any]:
     """Name and value of NAME=VALUE."""
     name, equals, value = text.partition("=")
@@ -410,6 +368,8 @@ def _describe(error: Exception) -> str:
         error
     ):  # the latter of a library
         return f"this process has no more memory ({error}); raise its limit (ulimit -v), or free memory"
+    if isinstance(error, ModuleNotFoundError):
+        return f"{error.name} is missing: pip install 'szlib[workbook]'"
     if isinstance(error, OSError) and error.errno in _UNWRITABLE and not error.filename:
         return f"standard output cannot be written ({error.strerror}); make room, or name another file"
     is_expected = isinstance(error, SzlibError | OSError) and str(error)

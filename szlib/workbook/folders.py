@@ -16,7 +16,6 @@ import json
 import os
 import re
 import shutil
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -212,51 +211,11 @@ def require_place(file: Path) -> Path:
 
 def read_defaults(notebook: Path) -> dict[str, Any]:
     """Read the default parameters from the cell tagged "parameters" of a `notebook` (a percent script)."""
-    return {name: value for name, value, _ in read_parameters(notebook)}
-
-
-def read_parameters(notebook: Path) -> list[tuple[str, Any, str]]:
-    """Name, default and comment of each parameter of a `notebook` (a percent script)."""
     cells = re.split(r"^# %%", notebook.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    return [
-        (node.targets[0].id, ast.literal_eval(node.value), _comment(body, node))
+    return {
+        node.targets[0].id: ast.literal_eval(node.value)
         for head, _, body in (cell.partition("\n") for cell in cells)
         if re.search(r'tags=\[[^]]*"parameters"', head)
         for node in ast.parse(body).body
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-    ]
-
-
-def _comment(body: str, node: ast.Assign) -> str:
-    """The comment behind an assignment."""
-    return (
-        body.splitlines()[(node.end_lineno or 1) - 1]
-        .encode()[node.end_col_offset :]
-        .decode()
-        .strip(" #")
-    )
-
-
-def describe_parameters(notebooks: Sequence[Path], meanings: Mapping[str, str]) -> str:
-    """List the parameters of the `notebooks` for a terminal: default, meaning, and numbers of notebooks.
-
-    `meanings` replace missing and short comments.  Parameters that many notebooks have come first.
-    """
-    numbers: dict[tuple[str, str], list[str]] = {}
-    comments: dict[tuple[str, str], str] = {}
-    for notebook in notebooks:
-        for name, value, comment in read_parameters(notebook):
-            if name not in OPTIONS:
-                numbers.setdefault((name, repr(value)), []).append(notebook.stem[:2])
-                comments.setdefault((name, repr(value)), comment)
-    lines = []
-    for name, value in sorted(numbers, key=lambda each: -len(numbers[each])):
-        where, meaning = (
-            numbers[name, value],
-            meanings.get(name) or comments[name, value],
-        )
-        text = f"{name} = {value}  {meaning} ({', '.join(where)})"
-        lines += textwrap.wrap(
-            text, 108, initial_indent="  ", subsequent_indent=" " * 6
-        )
-    return "\n".join(["parameters (-p NAME=VALUE):", *lines])
+    }

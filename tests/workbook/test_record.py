@@ -18,7 +18,6 @@ from szlib.workbook.record import (
     data_cache,
     notebook_record,
     parameters,
-    settings_table,
 )
 from szlib.zones.polar import PolarZone
 
@@ -249,13 +248,6 @@ def test_unknown_badge_is_refused():
     assert "gamma" in repr(table) and " at 0x" not in repr(table)
     with pytest.raises(ValueError, match="guessed"):
         parameters([("gamma", 0.05, "guessed", "")])
-
-
-def test_every_controller_setting_has_description_and_badge():
-    table = settings_table(szlib.MPCSettings()).data
-    assert set(table["parameter"]) == set(szlib.MPCSettings.__dataclass_fields__)
-    assert table["why"].str.len().min() > 5
-    assert "v_max" in table.set_index("parameter").index
 
 
 def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduced(

@@ -146,26 +146,3 @@ def test_a_log_has_no_progress_bar(
     notebooks(_01_good=GOOD)
     assert run() == 0
     assert capsys.readouterr().err == ""
-
-
-def test_help_lists_every_parameter_with_default_and_meaning(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Those of the workbook itself."""
-    from szlib.workbook import folders
-    from szlib.workbook.folders import OPTIONS, read_defaults
-
-    with pytest.raises(SystemExit):
-        main(["run", "--help"])
-    _, _, text = capsys.readouterr().out.partition("parameters (-p NAME=VALUE):\n")
-    rows = [line.split(None, 3) for line in text.splitlines()]
-    words = " ".join(text.split())
-    for script in folders.list_notebooks():
-        for name, value in read_defaults(script).items():
-            assert name in OPTIONS or f"{name} = {value!r} " in words, (
-                script.stem,
-                name,
-            )
-    assert all(len(row) == 4 for row in rows if len(row) > 1 and row[1] == "="), (
-        "each has a meaning"
-    )

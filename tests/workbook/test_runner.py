@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import sys
 
 import pytest
 
@@ -10,7 +11,7 @@ from szlib.core.errors import DataError
 from szlib.core.files import write_checksum
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook import cli, execution, runner
+from szlib.workbook import execution, runner
 from szlib.workbook.cli import main
 from szlib.workbook.record.data_cache import _load
 from szlib.workbook.record.parameters import check_parameters
@@ -314,10 +315,12 @@ def test_invalid_number_of_jobs_is_refused(jobs, capsys):
 
 
 def test_missing_packages_are_named(monkeypatch, capsys):
-    monkeypatch.setattr(cli, "_WORKBOOK_PACKAGES", ("nbclient", "no_such_package"))
+    monkeypatch.setitem(sys.modules, "nbclient", None)
+    monkeypatch.delitem(sys.modules, "szlib.workbook.execution")
+    monkeypatch.delitem(sys.modules, "szlib.workbook.runner")
     assert main(["run"]) == 2
     assert (
-        "need no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
+        "nbclient is missing: pip install 'szlib[workbook]'" in capsys.readouterr().err
     )
 
 

@@ -7,11 +7,11 @@ display          how tables, figures and parameters are shown
 """
 
 from .data_cache import DataCache
-from .display import ASSUMED, CHOSEN, MEASURED, PAPER, TUNED, parameters, settings_table
+from .display import ASSUMED, CHOSEN, MEASURED, PAPER, TUNED, parameters
 from .notebook_record import TABLES, NotebookRecord, read_table
 from .parameters import ZoneMethod
 
 __all__ = [
     "ASSUMED", "CHOSEN", "MEASURED", "PAPER", "TABLES", "TUNED", "DataCache",
-    "NotebookRecord", "ZoneMethod", "parameters", "read_table", "settings_table",
+    "NotebookRecord", "ZoneMethod", "parameters", "read_table",
 ]  # fmt: skip
