@@ -19,7 +19,7 @@ run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza; fails wh
 	$(BIN)/szlib run
 
 report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML file
-	$(BIN)/szlib report --open
+	$(BIN)/python -m webbrowser "file://$(CURDIR)/results/synthetic/report.html"
 
 docs: $(INSTALLED)  ## results/site: README, notebooks, which settings to choose, each public name, changes; no network
 	mkdir -p .docs/pages

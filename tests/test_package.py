@@ -292,6 +292,18 @@ def test_a_robots_process_loads_no_tables_and_no_figures() -> None:
     assert heavy & robot == set()
 
 
+def test_a_robot_needs_only_the_packages_of_a_plain_install() -> None:
+    """Its controller, a zone that ships, and a map: nothing of the extra `data`."""
+    (robot,) = loaded_after(
+        "import szlib\n"
+        "zone = szlib.reference_zone('grand-central-strangers')\n"
+        "person, _ = szlib.Person((3.0, 0.5)), szlib.walls_from_map\n"
+        "szlib.MPCCBF(zone).step((0, 0, 0, 0), (5, 0), [person])"
+    )
+    data = {"joblib", "polars", "pooch", "pyarrow", "sklearn", "threadpoolctl", "tqdm"}
+    assert "casadi" in robot and data & robot == set()
+
+
 def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
     (loaded,) = loaded_after(
         "from szlib.workbook.cli import build_parser; build_parser()"

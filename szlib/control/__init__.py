@@ -37,3 +37,12 @@ from .step import STATUSES, Scene, Step
 from .verification import Report
 from .walls import read_walls, walls_from_grid, walls_from_map
 from .ways import Way
+
+__all__ = [
+    "MPCCBF", "STATUSES", "Body", "Controller", "DifferentialDrive",
+    "DoubleIntegrator", "DriveStep", "HalfPlane", "MPCSettings", "Obstacle",
+    "Obstacles", "Person", "Prediction", "Priority", "Report", "Robot", "Scene",
+    "Step", "TrackedPeople", "Tracker", "Unicycle", "Wall", "Way", "Zone",
+    "advance", "as_controller", "barrier", "cbf_residual", "ellipse_distance",
+    "predict", "read_walls", "segment_distance", "walls_from_grid", "walls_from_map",
+]  # fmt: skip

@@ -13,3 +13,8 @@ from .settings import (
     SLOW_INTRUDERS,
     PlazaSettings,
 )
+
+__all__ = [
+    "ANY_SPEED_INTRUDERS", "RUSHING_INTRUDERS", "SLOW_INTRUDERS", "PlazaSettings",
+    "make_plaza", "positions", "precision_and_recall", "stage_encounters",
+]  # fmt: skip

@@ -52,3 +52,14 @@ from .scenario import (
     Variations,
     Worlds,
 )
+
+__all__ = [
+    "BEHAVIOURS", "CONTROLLERS", "FORMULATIONS", "GOAL_RADIUS", "MEETINGS",
+    "METHOD", "ONE_PERSON", "SCENARIOS", "STOPPED_SPEED", "STRATEGIES",
+    "WALKING_MODELS", "ZONES", "Behaviour", "Claim", "Crowd", "CrowdModel",
+    "LoopSettings", "ReactingPeople", "RolloutSetup", "Run", "Scenario",
+    "SimulationLog", "Variations", "VisiblePeople", "Worlds", "classify_outcome",
+    "classify_strategy", "compare", "compute_metrics", "compute_retreat", "drive",
+    "find_avoidance_start", "find_passing_side", "find_yielding_steps",
+    "make_mpc_cbf", "rollouts", "simulate",
+]  # fmt: skip

@@ -16,3 +16,8 @@ from . import datasets, funnels
 from .clock import check_tracks, clock_index, read_tracks, to_clock, to_pedpy
 from .readers import read_raw
 from .recipe import Recipe
+
+__all__ = [
+    "Recipe", "check_tracks", "clock_index", "datasets", "funnels", "read_raw",
+    "read_tracks", "to_clock", "to_pedpy",
+]  # fmt: skip

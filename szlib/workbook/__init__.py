@@ -1,11 +1,11 @@
 """How is it presented? Figures, records of notebooks, their execution, and the command line.
 
-figures       every figure that several notebooks share, one file a room
+figures       every figure that szlib itself draws
 record        what a notebook records, and the data that notebooks share
-folders       the notebooks, and the folders of results
-runner        execution of all notebooks; `execution`: of one; `kernel`: what it runs in
-summary       a run as a table, as Markdown and as JUnit XML
+folders       the notebooks, their parameters, and the folders of results
+runner        execution of all notebooks; `execution`: of one, in its kernel
+summary       a run as a table and as JUnit XML
 report        a run as one HTML file
 paper_sentences  every sentence of the paper that can be checked, and its verdict in a run
-cli, console  `szlib run | report | inspect | extract | fit | notebooks`
+cli           `szlib run | inspect | extract | fit | notebooks`; `fit_command`: from days or tracks to a zone
 """

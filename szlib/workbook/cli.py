@@ -26,27 +26,14 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
-from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
-
-import psutil
 
 from .. import __version__
 from ..core import memory
 from ..core.errors import DataError, DataWarning, SzlibError
 from ..core.input_files import printable
 
-# Packages of the extra `workbook`, which the commands `run` and `report` need.
-_WORKBOOK_PACKAGES = (
-    "anywidget",
-    "ipykernel",
-    "jupytext",
-    "latex2mathml",
-    "nbconvert",
-    "papermill",
-)
 _STOPPED = "stopped; finished results stay in their folder"
 # Errors of standard output or standard error that is full or closed.
 _BROKEN_STREAM = (OSError, ValueError)
@@ -56,7 +43,6 @@ _UNWRITABLE = (errno.EBADF, errno.EFBIG, errno.EIO, errno.ENOSPC, errno.EPIPE)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that `arguments` name (default: those of the process) and return its exit code."""
-    _open_missing_streams()
     for stream in (
         sys.stdout,
         sys.stderr,
@@ -66,9 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     try:
         with _stop_on_signals(), warnings.catch_warnings():
-            options = build_parser().parse_args(
-                [_mark_number(argument) for argument in given]
-            )
+            options = build_parser().parse_args(given)
             size = None if options.memory is None else memory.parse_size(options.memory)
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
             with memory.granted(size):
@@ -85,18 +69,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
-class _CommandParser(argparse.ArgumentParser):
-    """A parser whose help may end with a text that is made when the help is printed."""
-
-    list_parameters: Callable[[], str] | None = None
-
-    def format_help(self) -> str:
-        """The help, and the list of parameters if there is one."""
-        return super().format_help() + (
-            f"\n{self.list_parameters()}\n" if self.list_parameters else ""
-        )
-
-
 def build_parser() -> argparse.ArgumentParser:
     """Build the parser of the command line from `commands.toml`, which describes each command."""
     content = tomllib.loads(
@@ -108,13 +80,13 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     parser.set_defaults(memory=None)
-    groups = {name: _CommandParser(add_help=False) for name in content["groups"]}
+    groups = {
+        name: argparse.ArgumentParser(add_help=False) for name in content["groups"]
+    }
     for name, group in groups.items():
         one = group.add_mutually_exclusive_group() if name == "area" else group
         _add_arguments(one, content["groups"][name])
-    commands = parser.add_subparsers(
-        required=True, metavar="COMMAND", parser_class=_CommandParser
-    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, each in content["commands"].items():
         parents = [groups[group] for group in each.get("groups", ())]
         command = commands.add_parser(
@@ -125,7 +97,6 @@ def build_parser() -> argparse.ArgumentParser:
     run = commands.choices["run"]
     run.set_defaults(jobs=min(os.cpu_count() or 1, 4))
     run.description, _, run.epilog = str(inspect.getdoc(_run)).partition("\n\n")
-    run.list_parameters = partial(_list_parameters, content["parameters"])
     return parser
 
 
@@ -201,11 +172,11 @@ def _run(options: argparse.Namespace) -> int:
         parameters["has_walls"] = True
     if reading := _read_options(options, options.data):
         parameters["reading"] = reading
-    _require_workbook_packages()
+    from .folders import require_place
     from .runner import run
-    from .summary import append_markdown, format_summary, require_junit, write_junit
+    from .summary import format_summary, write_junit
 
-    junit = require_junit(Path(options.junit)) if options.junit else None
+    junit = require_place(Path(options.junit)) if options.junit else None
     summary = run(
         options.data[0] if len(options.data) == 1 else options.data,
         out=options.out,
@@ -216,7 +187,6 @@ def _run(options: argparse.Namespace) -> int:
         figures=options.figures,
     )
     print(format_summary(summary))
-    append_markdown(summary)
     if junit:
         write_junit(summary, junit)
     if "report" in summary:
@@ -231,47 +201,14 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if summary["passed"] else 1
 
 
-def _list_parameters(meanings: dict[str, str]) -> str:
-    """The parameters of the notebooks; `meanings` are those of parameters without a comment."""
-    from . import folders
-    from .notebook_parameters import describe_parameters
-
-    return describe_parameters(
-        folders.list_notebooks(folders.find_notebooks()), meanings
-    )
-
-
 def _notebooks(options: argparse.Namespace) -> int:
     """Copy the notebooks, and say how to go on."""
-    _require_workbook_packages()
     from .folders import copy_notebooks
 
     place = printable(copy_notebooks(options.folder))
     print(
         f"{place}: szlib run --notebooks {place} runs them, jupyter lab {place} opens them"
     )
-    return 0
-
-
-def _report(options: argparse.Namespace) -> int:
-    """Write the report of a run again."""
-    _require_workbook_packages()
-    from . import folders
-    from .report import write_report
-
-    home = (
-        Path(options.folder)
-        if options.folder
-        else folders.default_results() / "synthetic"
-    )
-    print(printable(os.path.relpath(file := write_report(home))))
-    if options.open:
-        import webbrowser
-
-        if not webbrowser.open(file.resolve().as_uri()):
-            raise SzlibError(
-                "no browser can be opened on this machine; open the file in a browser yourself"
-            )
     return 0
 
 
@@ -312,38 +249,25 @@ def _inspect(options: argparse.Namespace) -> int:
     print(funnels.text(funnels.get(samples)))
     if advice:
         print(advice)
-    if options.save is not None:
+    if options.save is None:
+        words = ["run", "--data", options.file]
+        words += ["--walls"] if options.walls else []
+        if isinstance(options.area, list):
+            words += ["--area", *map("{:.12g}".format, options.area)]
+        elif options.area == "auto":
+            words += ["--auto"]
+        elif options.area:
+            words += ["--polygon", options.area]
+        more = arguments(reading.as_json())
+    else:
         if "area" in samples.attrs:
             found = replace(found, area=samples.attrs["area"])
-        print(
-            "recipe saved:",
-            printable(found.save(options.save or files[0].with_name(FILE_NAME))),
-        )
-        reading = Recipe.load(options.save) if options.save else Recipe()
-        print(
-            "go on with:",
-            shlex.join(
-                [
-                    "szlib",
-                    "fit",
-                    options.file,
-                    *(["--recipe", options.save] if options.save else []),
-                ]
-            ),
-        )
-        return 0
-    words = [
-        "szlib",
-        "run",
-        "--data",
-        options.file,
-        *(["--walls"] if options.walls else []),
-    ]
-    if isinstance(options.area, list):
-        words += ["--area", *map("{:.12g}".format, options.area)]
-    elif options.area:
-        words += ["--auto"] if options.area == "auto" else ["--polygon", options.area]
-    print("go on with:", f"{shlex.join(words)} {arguments(reading.as_json())}".strip())
+        file = found.save(options.save or files[0].with_name(FILE_NAME))
+        print("recipe saved:", printable(file))
+        words = ["fit", options.file]
+        words += ["--recipe", options.save] if options.save else []
+        more = ""
+    print("go on with:", f"{shlex.join(['szlib', *words])} {more}".strip())
     return 0
 
 
@@ -383,14 +307,6 @@ def _fit(options: argparse.Namespace) -> int:
     return 0
 
 
-def _require_workbook_packages() -> None:
-    """Raise SzlibError if a package is missing that executes the notebooks."""
-    if missing := [name for name in _WORKBOOK_PACKAGES if find_spec(name) is None]:
-        raise SzlibError(
-            f"the notebooks need {', '.join(missing)}: pip install 'szlib[workbook]'"
-        )
-
-
 def _parse_parameter(text: str) -> tuple[str, Any]:
     """Name and value of NAME=VALUE."""
     name, equals, value = text.partition("=")
@@ -398,25 +314,8 @@ def _parse_parameter(text: str) -> tuple[str, Any]:
         raise DataError(f"parameter {text!r} must be NAME=VALUE, such as seed=1")
     try:
         return name, json.loads(value)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):
         return name, value
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # an integer with too many digits, or too many brackets
-        raise DataError(
-            f"parameter {name}: cannot be read ({error}); give a shorter value"
-        ) from error
-
-
-def _mark_number(argument: str) -> str:
-    """Put a space before a negative number such as -1.85e1, an option to argparse; -1 is none."""
-    with suppress(ValueError):
-        is_option = argument.startswith("-") and not re.fullmatch(
-            r"-\d+|-\d*\.\d+", argument, re.ASCII
-        )
-        return f" {argument}" if is_option and float(argument) < 0 else argument
-    return argument
 
 
 def _job_count(text: str) -> int:
@@ -440,39 +339,17 @@ _TYPES: dict[str, Callable[[str], Any]] = {
 def _stop_on_signals() -> Iterator[None]:
     """Let SIGTERM and SIGHUP stop the command as Ctrl-C does; a SIGHUP that is ignored stays ignored.
 
-    A second signal ends the command at once, with all its processes, and no other traceback is printed. So
-    does a first one where Python drops exceptions (in callbacks of weak references, which imports have).
-    Whatever goes wrong while the command stops, such as a closed terminal, the exit code is the signal's.
+    A second signal ends the process at once; those that it started end soon after it.
     """
-    stopped: list[int] = []
-
-    def end() -> None:
-        """End this process and all that it started."""
-        for process in psutil.Process().children(recursive=True):
-            with suppress(psutil.Error):
-                process.kill()
-        with suppress(OSError):
-            os.write(2, f"szlib: {_STOPPED}\n".encode())
-        os._exit(128 + stopped[-1])
 
     def stop(number: int, _frame: object) -> None:
         """Stop with the exit code of the signal."""
-        stopped.append(number)
-        if len(stopped) > 1:
-            end()
-        sys.unraisablehook = lambda lost: (
-            end() if lost.exc_type is KeyboardInterrupt else None
-        )
-        threading.excepthook = lambda _: None
+        signal.signal(number, signal.SIG_DFL)
         raise KeyboardInterrupt(128 + number)
 
     is_main = threading.current_thread() is threading.main_thread()
-    names = [
-        name
-        for name in ("SIGINT", "SIGTERM", "SIGHUP")
-        if is_main and hasattr(signal, name)
-    ]
-    numbers = [getattr(signal, name) for name in names]
+    names = ("SIGINT", "SIGTERM", "SIGHUP") if is_main else ()
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
     before = {
         n: signal.signal(n, stop)
         for n in numbers
@@ -480,23 +357,9 @@ def _stop_on_signals() -> Iterator[None]:
     }
     try:
         yield
-    except Exception as error:
-        if stopped:
-            raise KeyboardInterrupt(128 + stopped[0]) from error
-        raise
     finally:
         for number, handler in before.items():
-            if not stopped:  # until the process has ended
-                signal.signal(number, handler)
-
-
-def _open_missing_streams() -> None:
-    """Open the null device as each standard stream that is closed; otherwise another file gets its number."""
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            null = os.open(os.devnull, os.O_RDWR)
-            os.set_inheritable(null, True)
-            setattr(sys, name, os.fdopen(null, mode, encoding="utf-8"))
+            signal.signal(number, handler)
 
 
 def _describe(error: Exception) -> str:
@@ -505,6 +368,8 @@ def _describe(error: Exception) -> str:
         error
     ):  # the latter of a library
         return f"this process has no more memory ({error}); raise its limit (ulimit -v), or free memory"
+    if isinstance(error, ModuleNotFoundError):
+        return f"{error.name} is missing: pip install 'szlib[workbook]'"
     if isinstance(error, OSError) and error.errno in _UNWRITABLE and not error.filename:
         return f"standard output cannot be written ({error.strerror}); make room, or name another file"
     is_expected = isinstance(error, SzlibError | OSError) and str(error)

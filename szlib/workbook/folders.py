@@ -1,4 +1,4 @@
-"""The folders of results: one for each data set and each choice of parameters.
+"""The notebooks, their parameters, and the folders of results: one for each data set and choice of these.
 
     results/DATA/               a run with the default parameters
     results/DATA-1234abcd/      a run with other parameters; its parameters.json lists them
@@ -10,13 +10,15 @@ eight digits.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..core.errors import DataError, StorageError
@@ -27,6 +29,10 @@ from ..tracks import datasets
 # The folder of the notebooks: in an installed package, or beside the package in the repository.
 BUNDLED = Path(__file__).resolve().parent / "notebooks"
 NOTEBOOKS = BUNDLED if BUNDLED.is_dir() else BUNDLED.parents[2] / "notebooks"
+OPTIONS = {
+    "data": "--data",
+    "results": "--out",
+}  # parameters that are options of the command line
 RESULTS = "../results"  # the default folder of all results, relative to the notebooks
 RESULTS_OF = "results of "  # how the purpose of each folder of results begins
 # the purpose that marks the folder of all results
@@ -87,36 +93,32 @@ def list_notebooks(folder: Path | None = None) -> list[Path]:
 def copy_notebooks(folder: str | Path) -> Path:
     """Copy the workbook, with its exercises, to `notebooks` in a `folder`, and return that path.
 
-    Each script gets a notebook beside it, not executed; Jupytext keeps the two together. Raises StorageError
-    if there are files already, or the copy cannot be written.
+    With Jupytext each script gets a notebook beside it, not executed. Raises StorageError if there are files
+    already, or the copy cannot be written.
     """
-    import jupytext
-
     place = Path(folder) / "notebooks"
     try:
         if place.exists() and any(place.iterdir()):
             raise StorageError(
                 f"{printable(place)}: holds files; choose a new or empty folder"
             )
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=".szlib-", dir=place.parent) as private:
-            whole = shutil.copytree(
-                NOTEBOOKS, Path(private, place.name), ignore=_UNNEEDED
-            )
-            for script in (
-                *list_notebooks(whole),
-                *whole.glob("exercises/*.py"),
-                *whole.glob("solutions/*.py"),
-            ):
-                jupytext.write(jupytext.read(script), script.with_suffix(".ipynb"))
-            if place.exists():
-                place.rmdir()
-            whole.replace(place)
+        shutil.copytree(NOTEBOOKS, place, ignore=_UNNEEDED, dirs_exist_ok=True)
+        if find_spec("jupytext"):
+            _pair_notebooks(place)
     except OSError as error:
         raise StorageError(
             f"{printable(place)}: cannot be made ({error.strerror or error}); choose another folder"
         ) from error
     return place
+
+
+def _pair_notebooks(place: Path) -> None:
+    """Write a notebook beside each script in a copy of the workbook."""
+    import jupytext
+
+    sheets = (*place.glob("exercises/*.py"), *place.glob("solutions/*.py"))
+    for script in (*list_notebooks(place), *sheets):
+        jupytext.write(jupytext.read(script), script.with_suffix(".ipynb"))
 
 
 def has_name(notebook: Path, name: str) -> bool:
@@ -205,3 +207,15 @@ def require_place(file: Path) -> Path:
             f"{printable(file.parent)}: is no folder that can be written; choose another one"
         )
     return file
+
+
+def read_defaults(notebook: Path) -> dict[str, Any]:
+    """Read the default parameters from the cell tagged "parameters" of a `notebook` (a percent script)."""
+    cells = re.split(r"^# %%", notebook.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {
+        node.targets[0].id: ast.literal_eval(node.value)
+        for head, _, body in (cell.partition("\n") for cell in cells)
+        if re.search(r'tags=\[[^]]*"parameters"', head)
+        for node in ast.parse(body).body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    }

@@ -1,23 +1,15 @@
 """The report of a run: a front page and every executed notebook in one HTML file that needs no network.
 
 nbconvert, with which Jupyter itself exports, makes the page. The template and the renderer of this module
-leave out scripts of other servers, draw formulas as MathML, and fold the code.
-
-A folder may come from anybody. So its HTML goes through nbconvert's `SanitizeHTML`, and the content security
-policy of the page lets no script run but the player of this package.
+draw formulas as MathML, and fold the code. Only the run that wrote the notebooks makes their report.
 """
 
 from __future__ import annotations
 
 import io
-import json
 import re
-import tomllib
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from hashlib import sha256
-from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -27,159 +19,83 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
-from nbconvert.preprocessors.sanitize import SanitizeHTML
+from traitlets.config import Config
 
-from ..core.errors import DataError, SzlibError
-from ..core.files import MARKER, folder_purpose, write_file
-from ..core.input_files import open_regular, printable, read_json_object, read_small
+from ..core.files import write_file
 from ..plaza.settings import PlazaSettings
 from ..simulation import SCENARIOS
 from ..tracks import datasets, funnels
-from ..zones.social_zone import SocialZone
 from . import folders
-from .figures.movies import read_scripts
 from .paper_sentences import NOT_RUN, judge, load_sentences
+from .record.data_cache import read_stored_zone
 from .record.display import format_value
 from .record.parameters import METHOD_DEFAULTS
 
 REPORT = folders.REPORT
-_LARGEST_NOTEBOOK = 100_000_000  # of an executed notebook, with its animations [bytes]
 _STATIC = Path(__file__).parent / "static"
-_HARMLESS = tomllib.loads((_STATIC / "harmless.toml").read_text(encoding="utf-8"))
-# The kinds of outputs that are shown.
-_OUTPUTS = [
-    "text/html",
-    "text/markdown",
-    "text/plain",
-    "text/latex",
-    "image/png",
-    "image/jpeg",
-]
-_SCRIPT_OR_STYLE = re.compile(r"<(script|style)\b.*?</\1>", re.DOTALL)
-# The data of a player, and its name, in the script of `static/player.html`.
-_RUN = re.compile(
-    r"(?m)^const run = (\{.*\});\nconst figures = .*\[data-run=(szlib-[0-9a-f]{8})\]"
-)
-# A picture of the notebooks' own folder.
-_PICTURE = re.compile(r'src="(figures/\w+\.(png|gif))"')
+# The kinds of outputs that are shown, the first of them that an output has.
+_OUTPUTS = ["text/html", "text/markdown", "image/png", "image/jpeg", "text/plain"]
 # The text of a link to another file, and the name of the file without folder and ending.
 _FILE_LINK = re.compile(
     r"(?<!!)\[([^]\n]+)\]\((?!https?:|#|mailto:|data:)(?:[^)\s]*/)?([^)\s/.]*)(?:\([^)\s]*\)|[^)\s/])*\)"
 )
+# The figure of a player, and the description of its run.
+_PLAYER = re.compile(r'(<figure class="szlib-player"[^>]*>)<img [^>]*alt="([^"]*)"')
 
 
-def write_report(home: Path) -> Path:
-    """Write the report of the notebooks that were executed in the results folder `home`, and return its path.
+def write_report(home: Path, summary: Mapping[str, Any]) -> Path:
+    """Write the report of a run into its results folder, and return the path of the report.
 
-    Notebooks that are not in the summary of the last run are left out: an earlier version wrote them.
-    Raises DataError if the folder is not marked as results, holds no notebooks, or holds a damaged file.
+    Parameters
+    ----------
+    home : the folder, with the executed notebooks, the encounters and the zone.
+    summary : of the run, as `szlib.workbook.runner.run` writes it to summary.json.
     """
-    if not (folder_purpose(home) or "").startswith(folders.RESULTS_OF):
-        marker = printable(home / MARKER)
-        raise DataError(
-            f"{marker}: does not mark results of szlib; `szlib run` makes them"
-        )
-    names = [file.stem for file in sorted(home.glob("[0-9][0-9]*_*.ipynb"))]
-    run = read_json_object(home / "summary.json").get("notebooks")
-    names = [name for name in names if not isinstance(run, dict) or name in run]
-    if not names:
-        what = "holds no executed notebooks; `szlib run` makes them"
-        raise DataError(f"{printable(home)}: {what}")
-    notebooks, runs = {}, dict[str, Any]()
-    for name in names:
-        with _reading(home / f"{name}.ipynb"):
-            notebooks[name] = _read_notebook(home / f"{name}.ipynb", names, runs)
+    names = [name for name in summary["notebooks"] if (home / f"{name}.ipynb").exists()]
+    notebooks = {name: _read_notebook(home / f"{name}.ipynb", names) for name in names}
+    front, back = _render_front_page(home, summary, notebooks)
     page = nbformat.v4.new_notebook()
-    pages = _render_front_page(home, notebooks)
-    front, back = map(nbformat.v4.new_markdown_cell, pages)
-    cells = [cell for notebook in notebooks.values() for cell in notebook.cells]
-    page.cells = [front, *cells, back]
+    page.cells = [
+        nbformat.v4.new_markdown_cell(front),
+        *(cell for notebook in notebooks.values() for cell in notebook.cells),
+        nbformat.v4.new_markdown_cell(back),
+    ]
     for i, cell in enumerate(page.cells):
         cell["id"] = f"cell-{i}"
-    data = json.dumps(runs, separators=(",", ":")).replace("<", "\\u003c")
-    scripts = read_scripts("scene", "player", "report")
-    script = f"(() => {{\n{scripts}\nplayAll({data});\n}})()"
-    checksum = b64encode(sha256(script.encode()).digest()).decode()
-    page.metadata |= {"script": script, "script_checksum": f"sha256-{checksum}"}
     exporter = HTMLExporter(
+        config=Config(NbConvertBase={"display_data_priority": _OUTPUTS}),
         extra_loaders=[FileSystemLoader(_STATIC)],
         extra_template_basedirs=[],  # not the current folder, which is the default
         template_file="report.html.j2",
     )
-    write_file(home / REPORT, exporter.from_notebook_node(page)[0])
+    script = (_STATIC / "report.js").read_text(encoding="utf-8")
+    html, _ = exporter.from_notebook_node(page, {"script": script})
+    write_file(home / REPORT, html)
     return home / REPORT
 
 
-@contextmanager
-def _reading(file: Path) -> Iterator[None]:
-    """Raise DataError with the name of the `file` if the block cannot read it."""
-    try:
-        yield
-    except SzlibError:
-        raise
-    except Exception as error:  # whatever another program wrote
-        raise DataError(
-            f"{printable(file)}: is damaged or of another version of szlib ({error!a:.200}); `szlib run` "
-            "writes it again"
-        ) from error
-
-
-def _read_notebook(
-    file: Path, names: Sequence[str], runs: dict[str, Any]
-) -> nbformat.NotebookNode:
-    """The notebook in a `file`, its texts as harmless HTML.
-
-    Links to the notebooks `names` lead into the report. The runs that its players show are added to `runs`.
-    """
-    notebook = nbformat.reads(read_small(file, _LARGEST_NOTEBOOK), as_version=4)
-    nbformat.validate(notebook)
-    question = _find_question(notebook)
-    notebook.metadata |= {"question": question, "html": []}
+def _read_notebook(file: Path, names: Sequence[str]) -> nbformat.NotebookNode:
+    """The notebook in a `file`, its texts as HTML; links to the notebooks `names` lead into the report."""
+    notebook = nbformat.read(file, as_version=4)
+    question = re.search(
+        r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL
+    )
+    text = " ".join(question[1].replace("*", "").split()) if question else ""
     for cell in notebook.cells:
         cell.metadata.clear()
         if cell.cell_type == "markdown":
             cell.source = _render_markdown(cell.source, names)
-        elif cell.cell_type == "raw":
-            cell.source = sanitize(cell.source)
-        for output in cell.get("outputs", ()):
-            if "data" not in output:
-                continue
-            data = {kind: output.data[kind] for kind in _OUTPUTS if kind in output.data}
+        for data in _list_data(cell):
             if "text/markdown" in data:
                 data["text/markdown"] = _render_markdown(data["text/markdown"], names)
-            if html := data.get("text/html"):
-                runs |= {name: json.loads(run) for run, name in _RUN.findall(html)}
-                data["text/html"] = sanitize(_SCRIPT_OR_STYLE.sub("", html))
-                notebook.metadata["html"].append(data["text/html"])
-            alt = str(output.metadata.get("image/png", {}).get("alt", ""))
-            output.data = data or {"text/plain": ""}
-            output.metadata = nbformat.from_dict({"image/png": {"alt": alt}})
+    notebook.cells[0].metadata["fold"] = {"name": file.stem, "question": text}
+    notebook.cells[-1].metadata["is_last"] = True
     return notebook
 
 
-def sanitize(html: str) -> str:
-    """The same `html` with harmless tags and attributes only; pictures of the notebooks are embedded.
-
-    Nothing in it can run, or ask another server.
-    """
-    tags = _HARMLESS["tags"].split()
-    cleaner = SanitizeHTML(tags=tags, attributes=_is_harmless, strip=True)
-    return _PICTURE.sub(_embed, str(cleaner.sanitize_html_tags(html)))
-
-
-def _is_harmless(tag: str, name: str, value: str) -> bool:
-    """Whether the attribute `name` of a `tag` may have this `value`."""
-    if name == "src":
-        return tag == "img" and bool(_PICTURE.fullmatch(f'src="{value}"'))
-    return name in _HARMLESS["attributes"].split() or name == "href"
-
-
-def _embed(found: re.Match[str]) -> str:
-    """The attribute of a picture of the notebooks with its content; none without the file."""
-    file = folders.NOTEBOOKS / found[1]
-    if not file.is_file():
-        return ""
-    return f'src="data:image/{found[2]};base64,{b64encode(file.read_bytes()).decode()}"'
+def _list_data(cell: Any) -> Iterator[Any]:
+    """The data of each output of a cell, by kind."""
+    return (output.data for output in cell.get("outputs", ()) if "data" in output)
 
 
 class MathRenderer(IPythonRenderer):
@@ -199,45 +115,43 @@ class MathRenderer(IPythonRenderer):
 
 
 def _render_markdown(source: str, names: Sequence[str]) -> str:
-    """Render markdown as harmless HTML; links to the notebooks `names` lead into the report."""
+    """Render markdown as HTML with its pictures; links to the notebooks `names` lead into the report."""
     linked = _FILE_LINK.sub(
         lambda x: f"[{x[1]}](#{x[2]})" if x[2] in names else x[1], source
     )
-    renderer = MathRenderer(escape=False)
-    return sanitize(MarkdownWithMath(renderer=renderer).render(linked))
+    renderer = MathRenderer(
+        escape=False,
+        embed_images=True,
+        exclude_anchor_links=True,
+        path=str(folders.NOTEBOOKS),
+    )
+    return str(MarkdownWithMath(renderer=renderer).render(linked))
 
 
-def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str]:
+def _render_front_page(
+    home: Path, summary: Mapping[str, Any], notebooks: Mapping[str, Any]
+) -> Sequence[str]:
     """The pages before and after the executed `notebooks` as HTML, made from the results in `home`."""
     pages = Environment(
         loader=FileSystemLoader(_STATIC), autoescape=True, undefined=StrictUndefined
     )
-    outputs = [
-        (name, html)
-        for name, notebook in notebooks.items()
-        for html in notebook.metadata["html"]
-    ]
-    facts = _read_run(home)
-    with _reading(home / "summary.json"):
-        summary = _read_json(home / "summary.json")
-        stored = summary.get("notebooks", {}).items()
-        outcomes = {name: _format_outcome(name, outcome) for name, outcome in stored}
+    given = summary["parameters"]
+    speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
+    is_synthetic = summary["data"] == datasets.SYNTHETIC
+    outcomes = {
+        name: _format_outcome(name, outcome)
+        for name, outcome in summary["notebooks"].items()
+    }
     for name, notebook in notebooks.items():
-        question, outcome = notebook.metadata["question"], outcomes.get(name)
-        fold = {"name": name, "question": question, "outcome": outcome}
-        notebook.cells[0].metadata["fold"] = fold
-        notebook.cells[-1].metadata["is_last"] = True
-    zone, speed, texts = home / "zone.json", facts["speed"], dict[str, Any]()
-    with _reading(zone):
-        if zone.exists():
-            texts = _show_zone(zone, speed, is_synthetic=facts["is_synthetic"])
+        notebook.cells[0].metadata["fold"]["outcome"] = outcomes[name]
     checks = [check for outcome in outcomes.values() for check in outcome["checks"]]
     verdict = str(summary.get("verdict", ""))
-    described = {name: str(summary.get(name, "")) for name in _DESCRIBED}
     html = pages.get_template("front_page.html.j2").render(
-        **facts,
-        **described,
-        data=str(summary.get("data", home.name)),
+        **{name: str(summary.get(name, "")) for name in _DESCRIBED},
+        speed=speed,
+        is_synthetic=is_synthetic,
+        files=[f"{name} ({size:,} bytes)" for name, size, *_ in summary["files"]],
+        changed=[f"{name} = {value}" for name, value in given.items()],
         data_sets=datasets.NAMES,
         verdict=verdict.removeprefix(f"zone at {speed:g} m/s: "),
         outcomes=outcomes,
@@ -246,47 +160,25 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str
         claims=_list_claims(checks),
         notebooks=list(notebooks),
         funnel=_show_funnel(home / "encounters.parquet"),
-        zone=texts,
-        players={
-            s.name.replace("_", " "): _find_player(s.title, outputs)
-            for s in SCENARIOS.values()
-        },
-        rows=_list_parameters(outputs),
+        zone=_show_zone(home / "zone.json", speed, is_synthetic=is_synthetic),
+        players=_find_players(notebooks),
     )
     return html.rpartition("<!-- notebooks -->")[::2]
 
 
 # What the summary of a run says of it in one line each.
-_DESCRIBED = ("area", "date", "command", "machine", "versions")
-
-
-def _read_run(home: Path) -> dict[str, Any]:
-    """The data and the parameters of the run in `home`, as its file of parameters has them."""
-    with _reading(home / folders.PARAMETERS):
-        run = _read_json(home / folders.PARAMETERS)
-        given = dict(run.get("parameters", {}).items())
-        speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
-        files = [f"{name} ({size:,} bytes)" for name, size, *_ in run.get("files", ())]
-    return {
-        "is_synthetic": run.get("data") == datasets.SYNTHETIC,
-        "files": files,
-        "changed": [f"{name} = {value}" for name, value in given.items()],
-        "version": run.get("szlib", ""),
-        "speed": speed,
-    }
+_DESCRIBED = ("data", "area", "date", "command", "machine", "szlib", "versions")
 
 
 def _show_funnel(samples: Path) -> str:
     """The stages of the encounters in the file `samples` as a table; "" without a file."""
-    with _reading(samples):
-        if not samples.exists():
-            return ""
-        with open_regular(samples) as stream:
-            stages = funnels.table(funnels.get(pd.read_parquet(stream, columns=[])))
-        # each is named once
-        stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")
-        rows = {"rows": "{:,}".format}
-        return sanitize(stages.to_html(index=False, border=0, formatters=rows))
+    if not samples.exists():
+        return ""
+    stages = funnels.table(funnels.get(pd.read_parquet(samples, columns=[])))
+    # each is named once
+    stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")
+    rows = {"rows": "{:,}".format}
+    return str(stages.to_html(index=False, border=0, formatters=rows))
 
 
 def _list_claims(checks: Sequence[Mapping[str, Any]]) -> Any:
@@ -300,31 +192,23 @@ def _list_claims(checks: Sequence[Mapping[str, Any]]) -> Any:
 
 
 def _format_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
-    """The outcome of the notebook `name` as texts; an ordinary Python error where it is malformed."""
+    """The outcome of the notebook `name` with its numbers as texts."""
+    number = name.split("_")[0]
     checks = [
-        {part: str(check[part]) for part in ("kind", "name", "result")}
-        for check in outcome["checks"]
-    ]
-    for text, check in zip(checks, outcome["checks"], strict=True):
-        text |= {
-            "passed": check["passed"],
+        {
+            **check,
             "value": format_value(check["value"]),
             "notebook": name,
+            "key": f"{number}: {check['name']}",
         }
-        text["key"] = f"{name.split('_')[0]}: {text['name']}"
-    texts = {
-        "status": str(outcome["status"]),
-        "error": str(outcome.get("error", outcome["status"])),
+        for check in outcome["checks"]
+    ]
+    return {
+        "status": outcome["status"],
+        "error": outcome.get("error", outcome["status"]),
+        "seconds": f"{outcome['seconds']:.0f}",
+        "checks": checks,
     }
-    return {**texts, "seconds": f"{outcome['seconds']:.0f}", "checks": checks}
-
-
-def _find_question(notebook: Any) -> str:
-    """The question in the first cell of a notebook."""
-    found = re.search(
-        r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL
-    )
-    return " ".join(found[1].replace("*", "").split()) if found else ""
 
 
 def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any]:
@@ -333,14 +217,16 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
 
     from . import figures
 
-    zone = SocialZone.load(file)
+    zone = read_stored_zone(file) if file.exists() else None
+    if zone is None:
+        return {}
     table = zone.table()
     shown = table.filter(
         regex="^(speed|center_x|[ab](_low|_high)?|encounters|adequate|verdict)$"
     )
     texts: dict[str, Any] = {
         "method": zone.method,
-        "table": sanitize(shown.round(2).to_html(index=False, border=0)),
+        "table": shown.round(2).to_html(index=False, border=0),
     }
     if speed in zone.ellipses:
         figure, content = Figure(figsize=(4.8, 4.5), layout="constrained"), io.BytesIO()
@@ -350,31 +236,26 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
         texts |= {
             "picture": b64encode(content.getvalue()).decode(),
             "alt": figures.alt_text(figure),
+            "size": table.set_index("speed").loc[speed].to_dict(),
         }
-        texts |= {"size": table.set_index("speed").loc[speed].to_dict()}
     return texts
 
 
-def _find_player(title: str, outputs: Sequence[tuple[str, str]]) -> str:
-    """The first player of the scenario with a `title` among the outputs; "" if there is none."""
-    return next(
-        (h for _, h in outputs if "szlib-player" in h and f'alt="{title}:' in h), ""
-    )
-
-
-def _list_parameters(
-    outputs: Sequence[tuple[str, str]],
-) -> dict[tuple[str, ...], str]:
-    """Each row of the tables of `szlib.workbook.record.parameters`, and the first notebook that shows it."""
-    found: dict[tuple[str, ...], str] = {}
-    for name, html in outputs:
-        table = html.partition(">badge<")[2]
-        for row in re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL):
-            cells = re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)
-            found.setdefault(tuple(unescape(cell.strip()) for cell in cells), name)
-    return {cells: name for cells, name in found.items() if len(cells) == 4}
-
-
-def _read_json(file: Path) -> dict[str, Any]:
-    """The object in a JSON file; empty if the file is missing."""
-    return dict(json.loads(read_small(file)).items()) if file.exists() else {}
+def _find_players(notebooks: Mapping[str, Any]) -> dict[str, str]:
+    """A second figure for the first player of each scenario; the script of the first one plays both."""
+    html = [
+        data.get("text/html", "")
+        for notebook in notebooks.values()
+        for cell in notebook.cells
+        for data in _list_data(cell)
+    ]
+    figures = {
+        alt.partition(":")[0]: figure
+        for figure, alt in reversed(_PLAYER.findall("".join(html)))
+    }
+    titles = {s.title: s.name.replace("_", " ") for s in SCENARIOS.values()}
+    return {
+        name: f"{figures[title]}</figure>"
+        for title, name in titles.items()
+        if title in figures
+    }

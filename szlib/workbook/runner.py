@@ -12,7 +12,6 @@ import platform
 import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -21,6 +20,7 @@ from typing import Any
 
 import pandas as pd
 import psutil
+from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from .. import __version__
@@ -28,10 +28,10 @@ from ..core import memory
 from ..core.errors import DataError
 from ..core.files import folder_lock, temporary_folder, write_file
 from ..core.input_files import file_content, read_json_object
-from ..core.parallel import limit_jobs, safe_path, uninterrupted
+from ..core.parallel import limit_jobs, safe_path
 from ..tracks import datasets, funnels
 from . import folders
-from .execution import EMPTY_RECORD, STOPPED, execute_notebook
+from .execution import EMPTY_RECORD, execute_notebook
 from .record.data_cache import DataCache, describe_missing_data, read_stored_zone
 from .record.parameters import METHOD_DEFAULTS, check_parameters
 
@@ -42,7 +42,7 @@ LONGEST = ("06", "25", "26")
 SUMMARY = "summary.json"  # file of the outcome of a run
 # Packages whose versions the report states.
 PACKAGES = ("numpy", "scipy", "pandas", "scikit-learn", "casadi", "matplotlib")
-_POLL = 0.5  # longest wait before Ctrl-C is noticed, whichever thread receives it [s]
+NOT_STARTED: dict[str, Any] = {"status": "not started", "seconds": 0.0, **EMPTY_RECORD}
 
 
 def run(
@@ -92,26 +92,29 @@ def run(
         contents = [[file.name, *file_content(file)] for file in cache.files()]
         source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
         source |= {"files": contents, "parameters": given}
-        if read_stored_zone(zone := home / "zone.json") is None:  # of another version
-            zone.unlink(missing_ok=True)
         names = [script.stem for script in scripts]
-        others = _stored_outcomes(home, source).items()
-        known = {script.stem for script in folders.list_notebooks(place)} - {*names}
-        outcomes = {name: outcome for name, outcome in others if name in known}
+        known = {script.stem for script in folders.list_notebooks(place)}
+        outcomes = {
+            name: outcome
+            for name, outcome in _stored_outcomes(home, source).items()
+            if name in known
+        }
+        outcomes |= dict.fromkeys(names, NOT_STARTED)
         write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
         folders.remove_outputs(home, names)
-        _store_unfinished(home, outcomes, names)
+        unfinished = {**source, "passed": False, "notebooks": outcomes}
+        _store(home, unfinished)
         variables = given | {"data": data, "results": str(root)}
-        for script, outcome in _execute_all(scripts, variables, home, jobs, figures):
-            outcomes[script.stem] = outcome
-            _store_unfinished(home, outcomes, names)
+        for name, outcome in _execute_all(scripts, variables, home, jobs, figures):
+            outcomes[name] = outcome
+            _store(home, unfinished)
         source |= _describe_machine() | _describe_data(home, source, outcomes)
-        write_file(home / SUMMARY, json.dumps(_summarise(source, outcomes), indent=1))
+        summary = _store(home, _summarise(source, outcomes))
         if any((home / f"{name}.ipynb").exists() for name in outcomes):
             # importing it takes longer than all other imports
             from .report import write_report
 
-            source["report"] = str(write_report(home))
+            source["report"] = str(write_report(home, summary))
     return _summarise(source, {name: outcomes[name] for name in names})
 
 
@@ -161,16 +164,13 @@ def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Pat
 
     Raises DataError for an unknown name, and if there are no notebooks.
     """
-    scripts = folders.list_notebooks(place or folders.find_notebooks())
-    wanted = {
-        name: [script for script in scripts if folders.has_name(script, name)]
-        for name in only
-    }
-    if unknown := [name for name, found in wanted.items() if not found]:
+    scripts, names = folders.list_notebooks(place or folders.find_notebooks()), [*only]
+    found = {name: [s for s in scripts if folders.has_name(s, name)] for name in names}
+    if unknown := [name for name in names if not found[name]]:
         known = ", ".join(script.stem for script in scripts)
         raise DataError(f"no notebook {', '.join(unknown)}; there are {known}")
-    chosen = {script for found in wanted.values() for script in found}
-    return [script for script in scripts if not wanted or script in chosen]
+    chosen = sum(found.values(), start=list[Path]())
+    return [script for script in scripts if not names or script in chosen]
 
 
 def _execute_all(
@@ -179,8 +179,8 @@ def _execute_all(
     home: Path,
     jobs: int,
     figures: str | None,
-) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Execute the notebooks; yield the script and the outcome of each when it has ended."""
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Execute the notebooks; yield the name and the outcome of each when it has ended."""
     jobs = max(limit_jobs(jobs, len(scripts)), 1)
     threads = str(max(1, (os.cpu_count() or 1) // jobs))
     environment = {
@@ -189,47 +189,38 @@ def _execute_all(
         memory.VARIABLE: str(memory.limit() // jobs),
         "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", threads),
     }
-    ended, is_refused = set[Path](), False
-    executor = ThreadPoolExecutor(jobs)  # of threads that wait for kernels
+    workers = Parallel(
+        max(jobs, 2),  # at least one thread: signals stay with this one
+        pre_dispatch=jobs,
+        backend="threading",
+        return_as="generator_unordered",
+        batch_size=1,
+    )
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
     with bar, temporary_folder() as private:
         environment |= {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
+
+        def execute(script: Path) -> tuple[str, dict[str, Any]]:
+            """The name of a notebook and its outcome."""
+            return script.stem, execute_notebook(script, given, home, environment)
+
         try:
             for batch in split_batches(scripts):
+                is_refused = False
+                for name, outcome in workers(map(delayed(execute), batch)):
+                    is_refused |= outcome["status"] == "refused"
+                    bar.update()
+                    bar.set_postfix_str(f"{name} {outcome['status']}")
+                    yield name, outcome
                 if is_refused:
-                    break  # the later notebooks need its result
-                with uninterrupted():
-                    futures = {
-                        executor.submit(
-                            execute_notebook, script, given, home, environment
-                        ): script
-                        for script in batch
-                    }
-                running = set(futures)
-                while running:
-                    done, running = wait(
-                        running, timeout=_POLL, return_when=FIRST_COMPLETED
-                    )
-                    for future in done:
-                        script, outcome = futures[future], future.result()
-                        ended.add(script)
-                        is_refused |= outcome["status"] == "refused"
-                        bar.update()
-                        bar.set_postfix_str(f"{script.stem} {outcome['status']}")
-                        yield script, outcome
+                    return  # the later notebooks need its result
         except BaseException:
             _end_kernels()
             raise
-        finally:
-            executor.shutdown(cancel_futures=True)
-            STOPPED.clear()
-    for script in (script for script in scripts if script not in ended):
-        yield script, {"status": "not started", "seconds": 0.0, **EMPTY_RECORD}
 
 
 def _end_kernels() -> None:
     """End all kernels that still run, so that the threads that wait for them end, too."""
-    STOPPED.set()
     for process in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
             words = " ".join(process.cmdline())
@@ -250,28 +241,21 @@ def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
     return batches
 
 
-def _store_unfinished(
-    home: Path, outcomes: Mapping[str, Any], names: Sequence[str]
-) -> None:
-    """Write the `outcomes` that there are as a summary that has not passed; `names` are of all that run."""
-    if not outcomes:
-        (home / SUMMARY).unlink(missing_ok=True)
-        return
-    left = [name for name in names if name not in outcomes]
-    unfinished = {"passed": False, "unfinished": left, "notebooks": outcomes}
-    write_file(home / SUMMARY, json.dumps(unfinished, indent=1), durable=False)
-
-
 def _stored_outcomes(
     home: Path, source: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """The outcomes in the summary of an earlier run of the same `source`: version, data and parameters."""
-    if read_json_object(home / folders.PARAMETERS) != json.loads(json.dumps(source)):
-        return {}
-    stored = read_json_object(home / SUMMARY).get("notebooks")
-    outcomes = stored.items() if isinstance(stored, dict) else ()
-    whole = ((name, each) for name, each in outcomes if isinstance(each, dict))
-    return {name: each for name, each in whole if each.keys() >= EMPTY_RECORD.keys()}
+    """The outcomes of an earlier run of the same `source`: version, data and parameters."""
+    stored = read_json_object(home / SUMMARY)
+    is_same = {name: stored.get(name) for name in source} == json.loads(
+        json.dumps(source)
+    )
+    return dict(stored["notebooks"]) if is_same else {}
+
+
+def _store(home: Path, summary: dict[str, Any]) -> dict[str, Any]:
+    """Write the summary of a run, and return it."""
+    write_file(home / SUMMARY, json.dumps(summary, indent=1))
+    return summary
 
 
 def _summarise(

@@ -1,46 +1,31 @@
-"""The summary of a run as text: a table for a terminal, Markdown for GitHub, JUnit XML for other services."""
+"""The summary of a run as text: a table for a terminal, and JUnit XML for services that run tests."""
 
 from __future__ import annotations
 
-import io
-import os
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import StorageError, warn
 from ..core.files import write_file
-from ..core.input_files import printable, read_small
-from .folders import require_place
+from ..core.input_files import printable
 from .record.display import format_value
 
-# The environment variable in which GitHub names the file for the summary of a step.
-GITHUB = "GITHUB_STEP_SUMMARY"
-# The element of JUnit for a notebook of each status that is not "done".
-_ELEMENTS = {"error": "error", "refused": "error"}
+# The element of JUnit for a notebook of each status; others are skipped.
+_ELEMENTS = {"done": "", "error": "error", "refused": "error"}
 
 
 def format_summary(summary: Mapping[str, Any]) -> str:
     """Format the `summary` of a run: a row for each notebook, each result that does not hold, the verdict."""
-    rows, notes = list_results(summary)
     line = "{:<24} {:>7} {:>11} {:>9}  {}".format
-    return "\n".join([*(line(*row) for row in rows), *notes])
-
-
-def list_results(summary: Mapping[str, Any]) -> tuple[list[tuple[str, ...]], list[str]]:
-    """List rows of a table of the `summary` of a run, the first its head, and notes, the last its result."""
-    rows: list[tuple[str, ...]] = [
-        ("notebook", "seconds", "checks", "observed", "key figures")
-    ]
+    rows = [line("notebook", "seconds", "checks", "observed", "key figures")]
     notes, undecided = [], []
     for name, outcome in summary["notebooks"].items():
-        status, seconds = outcome["status"], f"{outcome['seconds']:.1f}"
+        status, figures = outcome["status"], outcome["key_figures"].items()
         checks = _count_passed(outcome, "check") if status == "done" else status
         observed = _count_passed(outcome, "observation")
-        figures = outcome["key_figures"].items()
         key = ", ".join(f"{label} {format_value(value)}" for label, value in figures)
-        rows.append((name, seconds, checks, observed, key))
+        rows.append(line(name, f"{outcome['seconds']:.1f}", checks, observed, key))
         notes += [
             f"{name}: {c['name']}: {c['result']} ({c['value']})"
             for c in outcome["checks"]
@@ -56,57 +41,15 @@ def list_results(summary: Mapping[str, Any]) -> tuple[list[tuple[str, ...]], lis
     notes += [f"data: {text}" for text in summary.get("warnings", ())]
     notes += [f"area: {summary['area']}"] if "area" in summary else []
     end = f"all checks {'that were made ' if undecided else ''}hold"
-    return rows, [*notes, end if summary["passed"] else "NOT ALL CHECKS HOLD"]
+    return "\n".join(
+        [*rows, *notes, end if summary["passed"] else "NOT ALL CHECKS HOLD"]
+    )
 
 
 def _count_passed(outcome: Mapping[str, Any], kind: str) -> str:
     """How many of a kind hold, of how many, such as "3/4"; "-" if there are none."""
     passed = [c["passed"] for c in outcome["checks"] if c["kind"] == kind]
     return f"{sum(passed)}/{len(passed)}" if passed else "-"
-
-
-def append_markdown(summary: Mapping[str, Any]) -> None:
-    """Append the results of a run to the file that GitHub names, if it does.
-
-    A file that cannot be written is a warning, and does not fail the run.
-    """
-    if not (file := os.environ.get(GITHUB)):
-        return
-    rows, (*notes, last) = list_results(summary)
-    head, *body = [f"| {' | '.join(map(_escape, row))} |" for row in rows]
-    items = [f"- {_escape(note)}" for note in notes]
-    lines = [
-        head,
-        "|---" * len(rows[0]) + "|",
-        *body,
-        "",
-        *items,
-        "",
-        f"**{last}**",
-        "",
-    ]
-    try:
-        with Path(file).open("a", encoding="utf-8") as stream:
-            stream.write("\n".join(lines))
-    except OSError as error:
-        reason = error.strerror or error
-        warn(f"${GITHUB}: {printable(file)} cannot be written ({reason})")
-
-
-def _escape(text: str) -> str:
-    """A text that Markdown shows as it is, in a cell of a table."""
-    return printable(text).replace("|", "\\|").replace("<", "&lt;")
-
-
-def require_junit(file: Path) -> Path:
-    """The `file`, if JUnit XML can be written there without replacing anything else; else StorageError."""
-    if file.suffix != ".xml":
-        raise StorageError(f"{printable(file)}: expected a file that ends in .xml")
-    require_place(file)
-    if file.exists() and b"<testsuites" not in read_small(file)[:100]:
-        what = "exists, and is no JUnit XML of szlib; choose another name"
-        raise StorageError(f"{printable(file)}: {what}")
-    return file
 
 
 def write_junit(summary: Mapping[str, Any], file: Path) -> None:
@@ -116,22 +59,27 @@ def write_junit(summary: Mapping[str, Any], file: Path) -> None:
     """
     root = ET.Element("testsuites")
     for name, outcome in summary["notebooks"].items():
-        checks = [check for check in outcome["checks"] if check["kind"] == "check"]
-        status = outcome["status"]
-        own = "" if status == "done" else _ELEMENTS.get(status, "skipped")
-        kinds = [own, *("" if check["passed"] else "failure" for check in checks)]
-        counts = {"tests": len(kinds), "failures": kinds.count("failure")}
-        counts |= {"errors": kinds.count("error"), "skipped": kinds.count("skipped")}
-        suite = ET.SubElement(root, "testsuite", name=name)
-        suite.attrib |= {key: str(count) for key, count in counts.items()}
-        suite.set("time", f"{outcome['seconds']:.3f}")
-        texts = [outcome.get("error", ""), *(c["result"] for c in checks)]
-        titles = [name, *(check["name"] for check in checks)]
-        for title, kind, text in zip(titles, kinds, texts, strict=True):
+        own = _ELEMENTS.get(outcome["status"], "skipped")
+        cases = [(name, own, outcome.get("error", ""))]
+        cases += [
+            (check["name"], "" if check["passed"] else "failure", check["result"])
+            for check in outcome["checks"]
+            if check["kind"] == "check"
+        ]
+        kinds = [kind for _, kind, _ in cases]
+        suite = ET.SubElement(
+            root,
+            "testsuite",
+            name=name,
+            time=f"{outcome['seconds']:.3f}",
+            tests=str(len(cases)),
+            failures=str(kinds.count("failure")),
+            errors=str(kinds.count("error")),
+            skipped=str(kinds.count("skipped")),
+        )
+        for title, kind, text in cases:
             label = printable(title)
             case = ET.SubElement(suite, "testcase", classname=name, name=label)
             if kind:
                 ET.SubElement(case, kind, message=printable(text))
-    content = io.BytesIO()
-    ET.ElementTree(root).write(content, encoding="utf-8", xml_declaration=True)
-    write_file(file, content.getvalue())
+    write_file(file, ET.tostring(root, encoding="utf-8", xml_declaration=True))

@@ -14,8 +14,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..tracks import funnels
-
 USABLE, UNDECIDED, NO_RESPECT = "usable", "undecided", "no respect shown"
 # Encounters that a description needs (quantile, hull): on real people the intervals of fewer hold the
 # truth too rarely (measured).
@@ -63,6 +61,8 @@ class Verdict(str):
 
 def judge(zone: FittedZone, speed: float) -> Verdict:
     """Judge a `zone` at a `speed` of the reference pedestrian [m/s]."""
+    from ..tracks import funnels  # reads tracks, which a robot does not
+
     test = zone.null_test
     if test is not None and not test.is_significant and test.n_encounters >= MIN_TESTED:
         compared = f"p = {test.p_value:.3g} ({test.n_shifts} shifts, {test.n_encounters} encounters)"

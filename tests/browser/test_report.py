@@ -1,14 +1,11 @@
 """The report in a real browser: what a first screen shows, at 1300 and at 390 pixels, by day and by night."""
 
-import json
-
 import nbformat
 import numpy as np
 import pandas as pd
 import pytest
 
 import szlib
-from szlib.core.files import claim_folder
 from szlib.workbook.report import write_report
 
 VERDICT = "undecided: no null model"
@@ -18,7 +15,7 @@ WIDE, NARROW = (1300, 900), (390, 844)
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     """The report of four short runs and a zone, with a wide table in the first notebook."""
-    home = claim_folder(tmp_path_factory.mktemp("run"), "results of mine")
+    home = tmp_path_factory.mktemp("run")
     n, rng = 3000, np.random.default_rng(0)
     samples = pd.DataFrame(
         {
@@ -61,14 +58,15 @@ def report(tmp_path_factory):
     outcome = {"status": "done", "seconds": 1, "checks": [slows]}
     summary = {
         "data": "hall",
+        "files": [["hall.csv", 9, "x"]],
+        "parameters": {},
         "verdict": f"zone at 1.1 m/s: {VERDICT}",
         "notebooks": {
             name: outcome | ({} if name == "10_corridor" else {"checks": []})
             for name in outputs
         },
     }
-    (home / "summary.json").write_text(json.dumps(summary))
-    return write_report(home).as_uri()
+    return write_report(home, summary).as_uri()
 
 
 @pytest.fixture(params=["light", "dark"])

@@ -145,7 +145,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
 
 
 def import_slow_modules() -> None:
-    """Import what `run` and `report` import when they begin, once and not in every fork: seconds each."""
+    """Import what `run` imports when it begins, once and not in every fork: seconds each."""
     for name in ("report", "runner"):
         importlib.import_module(f"szlib.workbook.{name}")
 

@@ -40,7 +40,7 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from szlib.workbook import folders
-from szlib.workbook.console import main
+from szlib.__main__ import main
 if __name__ == "__main__":
     folders.NOTEBOOKS = Path({notebooks!r})
     if sys.stdout and sys.stdout.isatty():

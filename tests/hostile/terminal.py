@@ -51,7 +51,7 @@ ACTIONS = {
 IMPORTS = 30
 """Number of times that Ctrl-C is typed while a command imports what it needs."""
 IMPORTING = """
-from szlib.workbook.console import main
+from szlib.__main__ import main
 print("ready", flush=True)
 raise SystemExit(main())
 """

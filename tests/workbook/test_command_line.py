@@ -50,17 +50,6 @@ def test_inspect_prints_a_funnel_that_adds_up(
     assert lines[-1][0] == "kept"
 
 
-def test_area_takes_negative_numbers_in_exponent_form(
-    day: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert (
-        main(["inspect", str(day), "--square", "-1.85e1", "2e1", "-.2E+2", "30."]) == 0
-    )
-    printed = capsys.readouterr().out.splitlines()
-    assert "area -18.5 20.0 -20.0 30.0" in printed
-    assert printed[-1].endswith("--area -18.5 20 -20 30")
-
-
 def test_file_may_be_called_like_a_number(
     day: Path,
     tmp_path: Path,
@@ -80,7 +69,7 @@ class Interrupt:
     def find_spec(self, name, *_):
         if name == "szlib.workbook.cli":
             os.kill(os.getpid(), signal.SIGINT)
-from szlib.workbook.console import main
+from szlib.__main__ import main
 sys.meta_path.insert(0, Interrupt())
 main()"""
     done = subprocess.run(
@@ -88,38 +77,6 @@ main()"""
         env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (-signal.SIGINT, b"")
-
-
-@pytest.mark.parametrize(
-    "work",
-    [
-        # A signal in a callback, which imports have: Python drops the exception, and the command goes on.
-        """
-class Closing:
-    def __del__(self):
-        os.kill(os.getpid(), signal.SIGHUP)
-def work(_):
-    Closing()
-    time.sleep(20)""",
-        # A library that makes another exception of it, or a closed terminal that cannot be written any more.
-        """
-def work(_):
-    try:
-        os.kill(os.getpid(), signal.SIGHUP)
-    finally:
-        raise OSError(errno.EIO, "Input/output error")""",
-    ],
-)
-def test_stopped_command_ends_with_the_code_of_the_signal(work: str) -> None:
-    program = f"import errno, os, signal, time\nfrom szlib.workbook import cli{work}\ncli._inspect = work\n"
-    done = subprocess.run(
-        [sys.executable, "-c", f"{program}raise SystemExit(cli.main(['inspect', 'x']))"],
-        capture_output=True, text=True, timeout=15,
-        env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
-    )  # fmt: skip
-    assert (done.returncode, done.stderr) == (
-        129, "szlib: stopped; finished results stay in their folder\n",
-    )  # fmt: skip
 
 
 def test_extract_prints_the_table(

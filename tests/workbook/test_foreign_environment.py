@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -11,7 +10,6 @@ from pathlib import Path
 import nbformat
 import pytest
 
-import szlib
 from szlib.core import files
 from szlib.workbook import cli, report, runner
 from szlib.workbook.cli import main
@@ -117,20 +115,6 @@ def test_umask_that_forbids_everything_is_named(
         os.umask(before)
     assert re.search("umask|out: cannot be made", capsys.readouterr().err)
     assert not list(tmp_path.glob("szlib-*"))
-
-
-def test_streams_that_are_closed_are_open_for_the_command_and_its_processes():
-    child = "import sys; sys.exit(None in (sys.stdin, sys.stdout, sys.stderr))"
-    program = f"""
-import subprocess, sys
-from szlib.workbook import cli
-cli._run = lambda _: print("table") or subprocess.call([sys.executable, "-c", {child!r}])
-sys.exit(cli.main(["run"]))"""
-    done = subprocess.run(
-        ["sh", "-c", 'exec "$@" 0<&- 1>&- 2>&-', "sh", sys.executable, "-c", program],
-        env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
-    )
-    assert done.returncode == 0
 
 
 @pytest.mark.usefixtures("without_kernels")

@@ -15,10 +15,9 @@ from szlib.workbook import folders
 from szlib.workbook.record import (
     DataCache,
     NotebookRecord,
-    committed_tables,
     data_cache,
+    notebook_record,
     parameters,
-    settings_table,
 )
 from szlib.zones.polar import PolarZone
 
@@ -164,10 +163,10 @@ def test_rows_of_a_file_that_is_replaced_and_put_back_are_not_stored(
     file, read = record.cache.files()[0], data_cache.read_tracks
     content, before = file.read_bytes(), file.stat()
 
-    def read_another(files, options):
+    def read_another(files, recipe):
         file.write_text("t,id,x,y\n0,1,0,0\n1,1,5,0\n")
         try:
-            return read(files, options=options)
+            return read(files, recipe=recipe)
         finally:
             file.write_bytes(content)
             os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
@@ -219,7 +218,7 @@ def test_where_many_people_meet_the_null_model_has_fewer_shifts(
     assert record.cache.null_model(few_shifts=4) == (39 if shifts == 39 else 4)
 
 
-def test_damaged_zone_is_fitted_again(record, monkeypatch, capsys):
+def test_damaged_zone_is_fitted_again(record, monkeypatch):
     (record.out / "zone.json").write_text("{")
     monkeypatch.setattr(
         DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []})
@@ -227,12 +226,9 @@ def test_damaged_zone_is_fitted_again(record, monkeypatch, capsys):
     monkeypatch.setattr(data_cache.SocialZone, "fit", lambda samples, **_: "zone")
     monkeypatch.setattr(DataCache, "store_zone", lambda self, zone: zone)
     assert record.cache.zone() == "zone"
-    assert "zone is fitted again" in capsys.readouterr().out
 
 
-def test_zone_of_the_paper_is_fitted_once_at_the_speed_of_the_robot(
-    record, monkeypatch
-):
+def test_zone_of_the_paper_is_fitted_at_the_speed_of_the_robot(record, monkeypatch):
     path = szlib.make_plaza(
         record.out / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=400)
     )
@@ -243,10 +239,6 @@ def test_zone_of_the_paper_is_fitted_once_at_the_speed_of_the_robot(
         samples, method="paper", speeds=[1.1], n_resamples=0
     )
     assert found == expected.ellipses[1.1]
-    monkeypatch.setattr(
-        data_cache.SocialZone, "fit", lambda *_, **__: pytest.fail("fitted again")
-    )
-    assert record.cache.paper_ellipse() == found
     assert not (record.out / "zone.json").exists()
 
 
@@ -258,19 +250,14 @@ def test_unknown_badge_is_refused():
         parameters([("gamma", 0.05, "guessed", "")])
 
 
-def test_every_controller_setting_has_description_and_badge():
-    table = settings_table(szlib.MPCSettings()).data
-    assert set(table["parameter"]) == set(szlib.MPCSettings.__dataclass_fields__)
-    assert table["why"].str.len().min() > 5
-    assert "v_max" in table.set_index("parameter").index
-
-
 def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduced(
     record, tmp_path, monkeypatch, capsys
 ):
-    for module in (committed, committed_tables):
+    for module in (committed, notebook_record):
         monkeypatch.setattr(module, "TABLES", tmp_path)
     monkeypatch.setattr("sys.argv", ["somewhere/study.py", "3"])
+    monkeypatch.setattr(committed, "STUDIES", {})
+    committed.study("99_made", notebook="99")(lambda row: {})
     monkeypatch.setattr(committed, "_describe_commit", lambda: "1234567")
     made = pd.DataFrame(
         {
@@ -280,7 +267,7 @@ def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduc
         }
     )
     committed.write_table(made, "99_made", seed=7)
-    table = committed_tables.read_table("99_made")
+    table = notebook_record.read_table("99_made")
     assert table.attrs == {
         "command": "python -m studies.study 3",
         "seed": 7,
@@ -309,8 +296,8 @@ def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduc
 
 
 def test_every_committed_table_says_how_it_was_made():
-    for file in committed_tables.TABLES.glob("*.csv"):
-        table = committed_tables.read_table(file.stem)
+    for file in notebook_record.TABLES.glob("*.csv"):
+        table = notebook_record.read_table(file.stem)
         assert table.attrs["command"].startswith("python -m studies.")
         assert len(table)
         assert table.attrs.keys() - {"probe"} == {"command", "seed", "commit"}

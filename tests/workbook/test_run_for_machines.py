@@ -1,4 +1,4 @@
-"""What `szlib run` writes for machines: JUnit XML, a Markdown summary, no progress bar in a log."""
+"""What `szlib run` writes for machines: JUnit XML, no progress bar in a log."""
 
 from __future__ import annotations
 
@@ -15,11 +15,6 @@ from szlib.workbook.summary import write_junit
 pytestmark = pytest.mark.usefixtures("without_kernels")
 GOOD = 'record.check("sum", True, 2)\nrecord.claim("paper", False, 0.25)'
 BAD = 'record.check("a < b & c", False, "\\x1b[0m")\nrecord.check("fine", True)'
-
-
-@pytest.fixture(autouse=True)
-def no_summary_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
 
 
 def run(*arguments: str) -> int:
@@ -131,8 +126,6 @@ def test_the_schema_of_jenkins_refuses(suite: str, problem: str) -> None:
     [
         ("nowhere/junit.xml", "nowhere: is no folder that can be written"),
         ("mine.csv/junit.xml", "mine.csv: is no folder that can be written"),
-        ("mine.csv", "expected a file that ends in .xml"),
-        ("other.xml", "exists, and is no JUnit XML of szlib"),
     ],
 )
 def test_junit_file_that_cannot_be_written_is_refused_before_the_run(
@@ -142,44 +135,9 @@ def test_junit_file_that_cannot_be_written_is_refused_before_the_run(
     message: str,
 ) -> None:
     notebooks(_01_good=GOOD)
-    Path("other.xml").write_text("<thesis/>")
     assert run("--junit", place) == 2
     assert message in capsys.readouterr().err
     assert not Path("out").exists()
-
-
-def test_markdown_is_appended_where_github_asks_for_it(
-    notebooks: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = tmp_path / "step.md"
-    file.write_text("before\n")
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(file))
-    notebooks(_01_good=GOOD, _02_bad='record.check("a | b", False, 3)')
-    assert run() == 1
-    lines = file.read_text().splitlines()
-    assert lines[0] == "before"
-    rows = [
-        [cell.strip() for cell in line.strip("|").split(" | ")]
-        for line in lines
-        if line[:1] == "|"
-    ]
-    assert rows[0] == ["notebook", "seconds", "checks", "observed", "key figures"]
-    assert [[row[0], *row[2:]] for row in rows[2:]] == [
-        ["01_good", "1/1", "-", "seed 0"], ["02_bad", "0/1", "-", "seed 0"],
-    ]  # fmt: skip
-    assert "- 02_bad: a \\| b: FAILED (3)" in lines
-    assert "**NOT ALL CHECKS HOLD**" in lines
-
-
-@pytest.mark.filterwarnings("default")
-def test_a_step_summary_that_cannot_be_written_is_a_warning(
-    notebooks: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "nowhere" / "step.md"))
-    notebooks(_01_good=GOOD)
-    assert run() == 0
-    assert "GITHUB_STEP_SUMMARY" in capsys.readouterr().err
 
 
 def test_a_log_has_no_progress_bar(
@@ -188,26 +146,3 @@ def test_a_log_has_no_progress_bar(
     notebooks(_01_good=GOOD)
     assert run() == 0
     assert capsys.readouterr().err == ""
-
-
-def test_help_lists_every_parameter_with_default_and_meaning(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Those of the workbook itself."""
-    from szlib.workbook import folders
-    from szlib.workbook.record.parameters import OPTIONS, read_defaults
-
-    with pytest.raises(SystemExit):
-        main(["run", "--help"])
-    _, _, text = capsys.readouterr().out.partition("parameters (-p NAME=VALUE):\n")
-    rows = [line.split(None, 3) for line in text.splitlines()]
-    words = " ".join(text.split())
-    for script in folders.list_notebooks():
-        for name, value in read_defaults(script).items():
-            assert name in OPTIONS or f"{name} = {value!r} " in words, (
-                script.stem,
-                name,
-            )
-    assert all(len(row) == 4 for row in rows if len(row) > 1 and row[1] == "="), (
-        "each has a meaning"
-    )

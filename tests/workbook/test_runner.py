@@ -3,8 +3,7 @@
 import json
 import os
 import re
-import time
-from concurrent.futures import ThreadPoolExecutor
+import sys
 
 import pytest
 
@@ -12,7 +11,7 @@ from szlib.core.errors import DataError
 from szlib.core.files import write_checksum
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook import cli, execution, runner
+from szlib.workbook import execution, runner
 from szlib.workbook.cli import main
 from szlib.workbook.record.data_cache import _load
 from szlib.workbook.record.parameters import check_parameters
@@ -316,10 +315,12 @@ def test_invalid_number_of_jobs_is_refused(jobs, capsys):
 
 
 def test_missing_packages_are_named(monkeypatch, capsys):
-    monkeypatch.setattr(cli, "_WORKBOOK_PACKAGES", ("nbclient", "no_such_package"))
+    monkeypatch.setitem(sys.modules, "nbclient", None)
+    monkeypatch.delitem(sys.modules, "szlib.workbook.execution")
+    monkeypatch.delitem(sys.modules, "szlib.workbook.runner")
     assert main(["run"]) == 2
     assert (
-        "need no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
+        "nbclient is missing: pip install 'szlib[workbook]'" in capsys.readouterr().err
     )
 
 
@@ -343,7 +344,7 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     notebooks(_01_one="")
-    monkeypatch.setattr(runner, "wait", interrupted)
+    monkeypatch.setattr(runner, "execute_notebook", interrupted)
     assert run() == 130
     assert "stopped" in capsys.readouterr().err
 
@@ -358,22 +359,11 @@ os.kill(os.getpid(), signal.SIGTERM)
 """
 
 
-@pytest.mark.parametrize("stopped", [True, False])
-def test_a_signal_that_ends_a_kernel_and_the_run_leaves_no_unfinished_copy(
-    tmp_path, monkeypatch, stopped
-):
+def test_a_notebook_whose_kernel_is_ended_leaves_no_unfinished_copy(tmp_path):
     script, folder = tmp_path / "01_one.py", tmp_path / "out"
     script.write_text(KILLS_ITS_KERNEL)
     folder.mkdir()
-    monkeypatch.setattr(execution, "_SIGNAL_DELAY", 20.0 if stopped else 0.01)
-    with ThreadPoolExecutor(1) as executor:
-        given = {"file": str(tmp_path / "begun")}
-        ended = executor.submit(execution.execute_notebook, script, given, folder, {})
-        while stopped and not (tmp_path / "begun").exists():
-            time.sleep(0.05)
-        if stopped:
-            time.sleep(0.5)  # the signal ends the kernel first
-            execution.STOPPED.set()
-        assert ended.result()["status"] == "refused"
-    execution.STOPPED.clear()
-    assert (folder / "01_one.ipynb").exists() != stopped
+    given = {"file": str(tmp_path / "begun")}
+    outcome = execution.execute_notebook(script, given, folder, {})
+    assert outcome["status"] == "refused" and "DeadKernelError" in outcome["error"]
+    assert not (folder / "01_one.ipynb").exists()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from math import isnan
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ from .style import (
 _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 _PADDING = 0.2  # margin around everything that is drawn [m]
-_SAME_PLACE = 0.35  # positions nearer than this share one time label [m]
+_SAME_PLACE = 0.35  # positions nearer to the last label than this have none [m]
 # a wall is drawn to its end if the end is at most this far from all else [m]
 _WALL_EXTENT = 3.0
 
@@ -46,7 +45,7 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
     """Plot robot, zones and walls at several times; later is darker (paper, fig. 6).
 
     The times [s] are written on the paths of the robot and of each person.  A person who stays in one place
-    has one label with both times.
+    has one label, with the first time.
 
     Parameters
     ----------
@@ -145,7 +144,7 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
 
 
 def draw_scenery(ax: Axes, scenario: Scenario) -> None:
-    """Draw what does not move, within the limits of `ax`: walls, other obstacles, and the goal."""
+    """Draw what stands still in a `scenario`, within the limits of `ax`: walls, other obstacles, the goal."""
     for obstacle in scenario.fixed:
         draw_obstacle(ax, obstacle)
     ax.plot(
@@ -159,6 +158,7 @@ def draw_scenery(ax: Axes, scenario: Scenario) -> None:
 
 
 def draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
+    """Draw the outline of a `zone` on `ax` in a `colour`."""
     (a, b), angle = zone.semi_axes, np.degrees(zone.angle)
     patch = EllipsePatch(
         zone.center, 2 * a, 2 * b, angle=angle, fill=False, edgecolor=colour, lw=1.6
@@ -167,7 +167,7 @@ def draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
 
 
 def draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[Artist]:
-    """Draw robot, zones and people at one time."""
+    """Draw people, zones and the robot on `ax` at a `row` of a `run`; `robot` and `zone` are colours."""
     drawn = [
         draw_zone(ax, ellipse, zone)
         for ellipse in place_zones(run.zones, run.people[row])
@@ -186,38 +186,24 @@ def draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[
 def _write_times(
     ax: Axes, time: Array, positions: Array, *, colour: str, above: float
 ) -> None:
-    """Write the times, shape (n,) [s], beside the positions, shape (n, 2) [m]; NaN for an absent person."""
-    labels: list[tuple[Array, list[str]]] = []
-    first = 0
-    for row in range(1, len(time) + 1):
-        if (
-            row < len(time)
-            and np.hypot(*(positions[row] - positions[first])) < _SAME_PLACE
-        ):
-            continue
-        if not isnan(positions[first, 0]):
-            here = positions[first:row].mean(axis=0)
-            until = f"-{time[row - 1]:.3g}" if row - 1 > first else ""
-            near = [
-                texts
-                for place, texts in labels
-                if np.hypot(*(here - place)) < _SAME_PLACE
-            ]
-            if not near:
-                labels.append((here, []))
-                near = [labels[-1][1]]
-            near[0].append(f"{time[first]:.3g}{until}")
-        first = row
+    """Write the times, shape (n,) [s], beside the positions, shape (n, 2) [m]; NaN for an absent person.
+
+    Whoever stays in one place has one label, with the first time.
+    """
     halo = [Stroke(linewidth=2, foreground="white"), Normal()]
-    for here, texts in labels:
+    last = np.full(2, np.inf)
+    for seconds, here in zip(time, positions, strict=True):
+        if not np.hypot(*(here - last)) > _SAME_PLACE:
+            continue
         label = ax.annotate(
-            ", ".join(texts), (here[0], here[1]), (0, above), textcoords="offset points"
+            f"{seconds:.3g}", here, (0, above), textcoords="offset points"
         )
         label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
+        last = here
 
 
 def set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
-    """Set limits that hold the paths, the goal, and the zones in the rows shown of each run.
+    """Set limits of `ax` that hold the paths, the goal, and the zones in the rows `shown` of each run.
 
     Much longer walls (`_WALL_EXTENT`) are cut off.
     """

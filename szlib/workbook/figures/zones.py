@@ -122,21 +122,18 @@ def plot_zones(
     ax = get_axes(ax, size=(6, 5))
     zone = None if isinstance(zones, Mapping) else zones
     shown = sorted((zones if isinstance(zones, Mapping) else zones.ellipses).items())
-    angles = np.linspace(np.pi / 6, 11 * np.pi / 6, len(shown)).tolist()
-    white = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-    for (speed, ellipse), colour, line, angle in zip(
-        shown, pick_colours(shown), cycle(_LINES), angles, strict=False
+    for (speed, ellipse), colour, line in zip(
+        shown, pick_colours(shown), cycle(_LINES), strict=False
     ):
-        label, curve = f"{speed:g} m/s", ellipse.curve()
+        label = f"{speed:g} m/s"
         if zone:
             verdict = zone.verdict(speed)
             line = "-" if verdict == "usable" else "--"
             label = label if verdict == "usable" else f"{label} ({verdict})"
             _draw_interval(ax, zone, speed, color=colour, alpha=0.15)
-        ax.plot(*curve.T, color=colour, linestyle=line, linewidth=2, label=label)
-        at = curve[round(angle / (2 * np.pi) * (len(curve) - 1))]
-        name = ax.annotate(f"{speed:g}", at, ha="center", va="center", bbox=white)
-        name.set(color=colour, fontsize=7, weight="bold")
+        ax.plot(
+            *ellipse.curve().T, color=colour, linestyle=line, linewidth=2, label=label
+        )
     draw_person(ax, 0, 0, 0, color=BLACK, markersize=10)
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     intervals = " and their 95 % intervals" if zone and zone.uncertainty else ""

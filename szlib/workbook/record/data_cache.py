@@ -46,7 +46,7 @@ class DataCache:
 
     Parameters
     ----------
-    folder : where the files are, `encounters.parquet`, `zone.json` and `area.txt`.
+    folder : where the files are, `encounters.parquet` and `zone.json`.
     data : "synthetic" (the plaza, which is then written into the folder), the name of another data set, or
         paths of track files.
     area : where encounters are found, as for `szlib.as_area`; "auto"; or "" for the default of the data.
@@ -110,20 +110,10 @@ class DataCache:
 
         `tracks`, the table of the data, saves reading the files again where the area depends on them.
         """
-        if content := load_cached(self._path("area.txt"), self._source()):
-            text, _, reason = content.decode().partition("\n")
-            return replace(as_area(text), reason=reason)
         settings = self.method.encounter_settings(self.area or None)
+        options = self.method.read_options()
         with self._unchanged_data() as files:
-            area = as_area(
-                one_day.with_area(
-                    settings, files, self.method.read_options(), tracks
-                ).area
-            )
-        store_cached(
-            self._path("area.txt"), f"{area}\n{area.reason}".encode(), self._source()
-        )
-        return area
+            return as_area(one_day.with_area(settings, files, options, tracks).area)
 
     def encounters(self) -> pd.DataFrame:
         """The encounters that notebook 02 stored, or the same found now."""
@@ -158,13 +148,7 @@ class DataCache:
     def zone(self) -> SocialZone:
         """The zone that notebook 05 stored, or the same fitted now."""
         file = self._path("zone.json")
-        if zone := _load(file, self._zone_source()):
-            return zone
-        if file.exists():
-            print(
-                "The zone is fitted again: zone.json was made from other data, or is damaged."
-            )
-        return self.fit_zone()
+        return _load(file, self._zone_source()) or self.fit_zone()
 
     def fit_zone(self) -> SocialZone:
         """Fit the zone, test it against the null model, and store it for later notebooks."""
@@ -194,23 +178,23 @@ class DataCache:
         return self.zone().ellipse(self.method.zone_speed)
 
     def paper_ellipse(self) -> Ellipse:
-        """The ellipse of the paper's method at `zone_speed` (sec. 2), fitted once, in the person's frame."""
-        r_max, speed = self.method.r_max, self.method.zone_speed
-        options: dict[str, Any] = {
-            "method": "paper",
-            "r_max": r_max,
-            "speeds": [speed],
-            "n_resamples": 0,
-        }
-        file, source = self._path("paper_zone.json"), self._source() | {"fit": options}
-        zone = _load(file, source) or _store(
-            SocialZone.fit(self.encounters(), **options), file, source
+        """The ellipse of the paper's method at `zone_speed` (sec. 2), in the person's frame."""
+        zone = SocialZone.fit(
+            self.encounters(),
+            method="paper",
+            r_max=self.method.r_max,
+            speeds=[self.method.zone_speed],
+            n_resamples=0,
         )
-        return zone.ellipse(speed)
+        return zone.ellipse(self.method.zone_speed)
 
     def store_zone(self, zone: SocialZone) -> SocialZone:
         """Store the `zone` for later notebooks, and return it with its source."""
-        return _store(zone, self._path("zone.json"), self._zone_source())
+        file, source = self._path("zone.json"), self._zone_source()
+        zone = replace(zone, provenance={**zone.provenance, "source": source})
+        zone.save(file)
+        write_checksum(file, file.read_bytes(), source)
+        return zone
 
     def _path(self, name: str) -> Path:
         """A file in the folder, which is made if it is missing."""
@@ -308,11 +292,3 @@ def _load(file: Path, source: dict[str, Any]) -> SocialZone | None:
         if zone and zone.provenance.get("source") == json.loads(json.dumps(source))
         else None
     )
-
-
-def _store(zone: SocialZone, file: Path, source: dict[str, Any]) -> SocialZone:
-    """Write a zone and its checksum to a file; the zone with its source."""
-    zone = replace(zone, provenance={**zone.provenance, "source": source})
-    zone.save(file)
-    write_checksum(file, file.read_bytes(), source)
-    return zone

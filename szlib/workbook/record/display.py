@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import inspect
 import io
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from pandas.io.formats.style import Styler
-
-from ...control.settings import MPCSettings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,25 +44,6 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
         raise ValueError(f"badges must be {', '.join(known)}; got {sorted(unknown)}")
     return _style(
         _FoldedTable, pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"])
-    )
-
-
-def settings_table(settings: MPCSettings) -> Styler:
-    """Make a table of the controller's `settings`, with the descriptions of the class's docstring."""
-    descriptions: dict[str, str] = {}
-    entries = re.findall(
-        r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)",
-        str(inspect.getdoc(settings)),
-        re.MULTILINE,
-    )
-    for names, text in entries:
-        descriptions |= dict.fromkeys(names.split(", "), " ".join(text.split()))
-    badges = settings.badges().items()
-    return parameters(
-        [
-            (name, getattr(settings, name), badge, descriptions[name])
-            for name, badge in badges
-        ]
     )
 
 

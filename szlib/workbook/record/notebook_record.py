@@ -3,6 +3,11 @@
 A *check* must hold, or the run fails. With other parameters than the defaults it becomes an *observation*,
 which cannot fail the run, unless it holds for all parameters (`always`). A *claim* of the paper is measured:
 if the data does not support it, the record says "not supported here", and the run goes on.
+
+A table that is committed beside the notebooks is a CSV file whose first line is a comment, ``# {"command":
+..., "seed": ..., "commit": ...}``: the command that made the table, its seed, and the commit of the code that
+it ran; and, if the column or the rows that are computed again were added later, the commit that computed
+them, as "probe".
 """
 
 from __future__ import annotations
@@ -22,7 +27,6 @@ from ...core.files import claim_folder, write_file
 from ...core.input_files import read_json_object
 from ...tracks import datasets
 from .. import folders
-from .committed_tables import find_differences, read_table
 from .data_cache import DataCache
 from .display import (
     format_outputs,
@@ -31,17 +35,16 @@ from .display import (
     show_figure,
     style_table,
 )
-from .parameters import (
-    METHOD_DEFAULTS,
-    NEUTRAL,
-    OPTIONS,
-    ZoneMethod,
-    check_injected,
-    read_defaults,
-)
+from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, read_defaults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+TABLES = folders.NOTEBOOKS / "tables"
+"""The folder of the committed tables."""
+RELATIVE, ABSOLUTE = 5e-4, 5e-5
+"""Differences that are due to rounding to four digits, relative to a number and absolute."""
 
 
 class NotebookRecord:
@@ -64,10 +67,6 @@ class NotebookRecord:
     out : the folder of its results: that of the run, or one in `results/lab` if executed by hand.
     key : key figures by name, for the summary of the run.
 
-    Raises
-    ------
-    DataError : papermill has set a parameter that is unknown to the notebook.
-
     Examples
     --------
     >>> from szlib.workbook.record import NotebookRecord
@@ -86,7 +85,6 @@ class NotebookRecord:
         self.checks: list[dict[str, Any]] = []
         self.figures: list[str] = []
         self.key: dict[str, Any] = {}
-        check_injected(variables.get("In", ()))
         script = next(
             (each for each in folders.list_notebooks() if each.stem == name), None
         )
@@ -245,6 +243,32 @@ class NotebookRecord:
     def _save_picture(self, content: bytes, name: str) -> None:
         write_file(self.out / "figures" / name, content, durable=False)
         self.figures.append(name)
+
+
+def read_table(name: str) -> pd.DataFrame:
+    """Read `name`.csv from `TABLES`; its `attrs` are command, seed and commit."""
+    with (TABLES / f"{name}.csv").open(encoding="utf-8") as file:
+        header = file.readline()
+        table = pd.read_csv(file)
+    table.attrs |= json.loads(header.removeprefix("# "))
+    return table
+
+
+def find_differences(
+    row: pd.Series[Any], again: Mapping[str, Any]
+) -> dict[str, list[Any]]:
+    """The values of a `row` and those computed `again`, by column, where they differ."""
+    return {
+        name: [row[name], value]
+        for name, value in again.items()
+        if not _is_same(row[name], value)
+    }
+
+
+def _is_same(stored: Any, value: Any) -> bool:
+    if isinstance(stored, str) or isinstance(value, str):
+        return bool(stored == value)
+    return bool(np.isclose(stored, value, rtol=RELATIVE, atol=ABSOLUTE, equal_nan=True))
 
 
 def _is_true(value: Any) -> bool:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +17,7 @@ from ...tracks.recipe import Recipe
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
-from ..notebook_parameters import OPTIONS, read_defaults
+from ..folders import OPTIONS, read_defaults
 
 # Parameters that set the controller under another name, or that list values of one of its settings.
 SETTINGS = {"gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
@@ -165,24 +162,6 @@ def check_parameters(
     }
 
 
-def check_injected(cells: Sequence[str]) -> None:
-    """Raise DataError if papermill's cell among the executed `cells` sets an unknown parameter.
-
-    That cell begins with "# Parameters", and follows the cell of the notebook's own parameters.
-    """
-    for own, injected in pairwise(cells):
-        if injected.startswith("# Parameters\n"):
-            given, known = (
-                set(re.findall(r"^(\w+) *=", cell, re.MULTILINE))
-                for cell in (injected, own)
-            )
-            if unknown := given - known - METHOD_DEFAULTS.keys():
-                raise DataError(
-                    f"unknown parameter {', '.join(sorted(unknown))}; "
-                    f"the notebook knows {', '.join(sorted(known))}"
-                )
-
-
 def _check_type(name: str, value: Any, default: Any) -> None:
     is_whole = (
         isinstance(default, float)
@@ -198,18 +177,16 @@ def _check_type(name: str, value: Any, default: Any) -> None:
 def _check_range(name: str, value: Any) -> None:
     if isinstance(value, Mapping):
         return
-    if isinstance(value, float) and not math.isfinite(value):
-        raise DataError(f"parameter {name}: expected a finite number; got {value!r}")
-    if isinstance(value, str) and printable(value) != value:
-        raise DataError(f"parameter {name}: expected readable text; got {value!a:.80}")
-    low, high = RANGES.get(name, (-math.inf, math.inf))
-    if not isinstance(value, str) and not low <= value <= high:
+    if isinstance(value, str):
+        if printable(value) != value:
+            raise DataError(
+                f"parameter {name}: expected readable text; got {value!a:.80}"
+            )
+        return
+    low, high = RANGES.get(name, (-_LARGEST, _LARGEST))
+    if not low <= value <= high:
         raise DataError(
             f"parameter {name}: expected {low:g} to {high:g}; got {value!a:.80}"
-        )
-    if name == "n_jobs" and value == 0:
-        raise DataError(
-            "parameter n_jobs: expected a number of processes, or -1 for every core; got 0"
         )
     setting = SETTINGS.get(name, name)
     if setting in MPCSettings.__dataclass_fields__:

@@ -1,15 +1,5 @@
-// Makes a report convenient; `runs` holds the data of its players by name.
-function playAll(runs) {
-  // Replaces the pictures of finished runs that are visible by players.
-  const show = () => {
-    for (const figure of document.querySelectorAll("figure.szlib-player:not([data-ready])")) {
-      try {
-        if (figure.clientWidth && Object.hasOwn(runs, figure.dataset.run)) play(figure, runs[figure.dataset.run]);
-      } catch (error) {
-        console.error(error);  // the data of another program; the other players go on
-      }
-    }
-  };
+// Makes a report convenient.
+(() => {
   // Opens the notebook that holds the target of a link.
   const reveal = (hash) => {
     const fold = document.getElementById(decodeURIComponent(hash.slice(1)))?.closest("details");
@@ -26,7 +16,6 @@ function playAll(runs) {
       for (const cell of [...column, ...titles]) cell.classList.add("number");
     }
   }
-  addEventListener("toggle", show, true);
   addEventListener("hashchange", () => reveal(location.hash));
   addEventListener("click", (event) => {
     const link = event.target.closest('a[href^="#"]');
@@ -35,5 +24,4 @@ function playAll(runs) {
     reveal(link.hash);
   });
   reveal(location.hash);
-  show();
-}
+})();
