@@ -140,7 +140,10 @@ class UsableBlocks:
 
 
 def reach_in_cells(duration: float, max_gap: float) -> tuple[float, int, int]:
-    """Length w of a cell [s], and how many cells before and after one with a tick inside are needed."""
+    """Length w of a cell [s], and how many cells before and after one with a tick inside are needed.
+
+    `duration` [s] and `max_gap` [s] are as in `select_near`.
+    """
     width = max_gap + _TIME_ROUNDING
     spans = (VELOCITY_SPAN, max(duration, VELOCITY_SPAN))
     before, after = (ceil((span + width) / width) for span in spans)

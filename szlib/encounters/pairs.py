@@ -378,5 +378,5 @@ class Crowd:
 
 
 def name_kinds(codes: np.ndarray) -> pd.Categorical:
-    """The kinds with these numbers."""
+    """The kinds with the numbers `codes`."""
     return pd.Categorical(np.array(KINDS)[codes], categories=list(KINDS))
