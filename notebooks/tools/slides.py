@@ -229,6 +229,7 @@ class HandoutExporter(WebPDFExporter):
             browser = driver.chromium.launch(executable_path=find_browser(), args=["--no-sandbox"])
             page = browser.new_page(offline=True)
             page.set_content(html)
+            page.add_style_tag(content="pre { white-space: pre-wrap !important; }")
             content = page.pdf(format="A4", print_background=True, margin=dict.fromkeys(MARGINS, "12mm"))
             browser.close()
         return content
@@ -244,7 +245,8 @@ def make_handout(notebook: NotebookNode, stem: str) -> bytes:
     handout = deepcopy(notebook)
     for cell in handout.cells:
         if cell.cell_type == "markdown":
-            cell.source = FOLD.sub("", cell.source)
+            _, aims, text = cell.source.rpartition(NAVIGATION)  # its links lead nowhere on paper
+            cell.source = FOLD.sub("", aims + text)
             continue
         if is_hidden := cell.metadata.get("jupyter", {}).get("source_hidden", False):
             cell.outputs = [each for each in cell.outputs if each.output_type != "stream"]
