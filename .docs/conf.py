@@ -201,6 +201,7 @@ def adapt_docstring(app, what, name, obj, options, lines):
     """
     for at in reversed(range(len(lines))):
         lines[at] = re.sub(r"(?<!`)`([^`\n]+)`(?!`)", r"``\1``", lines[at])
+        lines[at] = re.sub(r"\|(\w+)\|", r"\\|\1\\|", lines[at])
         if entry := re.match(r"(\*{0,2}\w+(?:, \*{0,2}\w+)*) : (.*)$", lines[at]):
             lines[at : at + 1] = [entry[1], f"    {entry[2]}"]
         elif what == "module" and (
