@@ -20,6 +20,7 @@ from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
 
 import szlib
+from szlib.core.files import claim_folder
 
 HERE = Path(__file__).parent
 ROOT, PAGES = HERE.parent, HERE / "pages"
@@ -114,6 +115,17 @@ def copy_pages(*_):
     (PAGES / "index.md").write_text("\n".join(lines), encoding="utf-8")
 
 
+def claim_site(app, _):
+    """Mark the folder of the site, which lies among the results of `szlib run`."""
+    if not any(Path(app.outdir).iterdir()):
+        claim_folder(app.outdir, "site of the docs")
+
+
+def remove_copies(app, _):
+    """Remove the pictures that myst-nb leaves beside the site, which has its own."""
+    shutil.rmtree(Path(app.outdir).parent / "jupyter_execute", ignore_errors=True)
+
+
 def find_pages(pattern):
     """The names of the copied pages that match a pattern, in their order."""
     return [
@@ -201,6 +213,7 @@ def adapt_docstring(app, what, name, obj, options, lines):
     """
     for at in reversed(range(len(lines))):
         lines[at] = re.sub(r"(?<!`)`([^`\n]+)`(?!`)", r"``\1``", lines[at])
+        lines[at] = re.sub(r"\|(\w+)\|", r"\\|\1\\|", lines[at])
         if entry := re.match(r"(\*{0,2}\w+(?:, \*{0,2}\w+)*) : (.*)$", lines[at]):
             lines[at : at + 1] = [entry[1], f"    {entry[2]}"]
         elif what == "module" and (
@@ -221,5 +234,7 @@ def draw_formula(translator, node):
 def setup(app):
     """Connect what this file defines."""
     app.add_html_math_renderer("mathml", (draw_formula, None), (draw_formula, None))
+    app.connect("config-inited", claim_site)
     app.connect("config-inited", copy_pages)
+    app.connect("build-finished", remove_copies)
     app.connect("autodoc-process-docstring", adapt_docstring, priority=400)

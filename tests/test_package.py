@@ -304,6 +304,14 @@ def test_a_robot_needs_only_the_packages_of_a_plain_install() -> None:
     assert "casadi" in robot and data & robot == set()
 
 
+def test_what_kernels_are_forked_with_has_no_threads_of_polars() -> None:
+    """A fork does not survive them: a notebook would wait for ever when it reads tracks."""
+    from szlib.workbook.execution import PRELOADED
+
+    (loaded,) = loaded_after(f"import {', '.join(PRELOADED)}")
+    assert "matplotlib" in loaded and "polars" not in loaded
+
+
 def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
     (loaded,) = loaded_after(
         "from szlib.workbook.cli import build_parser; build_parser()"

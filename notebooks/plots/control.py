@@ -14,7 +14,6 @@ from szlib.control.obstacles import barrier, check_wall, ellipse_distance, segme
 from szlib.control.step import Step
 from szlib.core.checks import Array
 from szlib.workbook.figures.style import (
-    ARROW,
     BLACK,
     BLUE,
     GREEN,
@@ -28,6 +27,13 @@ from szlib.workbook.figures.style import (
 )
 from szlib.zones.ellipses import Ellipse
 
+ARROW: dict[str, Any] = {
+    "angles": "xy",
+    "scale_units": "xy",
+    "scale": 1,
+    "width": 0.008,
+    "zorder": 3,
+}
 # Colours and lines of ways, the one that is taken first; a print in grey keeps them apart.
 _WAYS: tuple[tuple[str, Any], ...] = (
     (BLUE, "-"),

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 
 from szlib.encounters.geometry import Area
 from szlib.workbook.figures.style import (
@@ -13,7 +17,6 @@ from szlib.workbook.figures.style import (
     RED,
     SEQUENCE,
     add_legend_below,
-    area_patch,
     get_axes,
     label_metres,
 )
@@ -115,10 +118,16 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     shown = np.ma.masked_less_equal(np.log10(np.maximum(seconds, 1e-9)), -0.5)
     image = ax.pcolormesh(edges[0], edges[1], shown.T, cmap=SEQUENCE, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
-    ax.add_patch(area_patch(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
+    ax.add_patch(_outline_area(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
     add_legend_below(ax)
     for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
         low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
         margin = 0.02 * (high - low)
         ax.set(**{f"{axis}lim": (low - margin, high + margin)})
     return label_metres(ax, "Where people walked, and the area")
+
+
+def _outline_area(area: Area, **style: Any) -> PathPatch:
+    """Return the borders of `area`, with its holes, as one patch; `style` as for matplotlib's PathPatch."""
+    rings = [Path(ring, closed=True) for ring in area.outlines]
+    return PathPatch(Path.make_compound_path(*rings), fill=False, **style)

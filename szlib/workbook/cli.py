@@ -27,12 +27,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..core import memory
 from ..core.errors import DataError, DataWarning, SzlibError
 from ..core.input_files import printable
+
+if TYPE_CHECKING:
+    from ..tracks.recipe import Recipe
 
 _STOPPED = "stopped; finished results stay in their folder"
 # Errors of standard output or standard error that is full or closed.
@@ -110,10 +113,8 @@ def _add_arguments(parser: Any, arguments: dict[str, dict[str, Any]]) -> None:
         parser.add_argument(*names.split(), **options)
 
 
-def _read_options(
-    options: argparse.Namespace, data: str | Sequence[str]
-) -> dict[str, Any]:
-    """The recipe of a command: single values, over that of --recipe or of a file beside the data, as JSON."""
+def _read_options(options: argparse.Namespace, data: str | Sequence[str]) -> Recipe:
+    """The recipe of a command: single values, over that of --recipe or of a file beside the data."""
     from ..tracks import datasets
     from ..tracks.recipe import Recipe, find_recipe
 
@@ -135,7 +136,7 @@ def _read_options(
     known = {each.name for each in fields(Recipe)} - {"columns", "area"}
     given = {name: getattr(options, name) for name in known}
     recipe = Recipe.load(options.recipe) if options.recipe else None
-    return find_recipe(files, recipe, columns=columns or None, **given).as_json()
+    return find_recipe(files, recipe, columns=columns or None, **given)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -170,7 +171,7 @@ def _run(options: argparse.Namespace) -> int:
         parameters["area"] = options.area
     if options.walls:
         parameters["has_walls"] = True
-    if reading := _read_options(options, options.data):
+    if reading := _read_options(options, options.data).as_json():
         parameters["reading"] = reading
     from .folders import require_place
     from .runner import run
@@ -223,14 +224,14 @@ def _inspect(options: argparse.Namespace) -> int:
     from ..tracks import datasets, funnels
     from ..tracks.clock import read_tracks
     from ..tracks.readers import describe_file
-    from ..tracks.recipe import FILE_NAME, Recipe, arguments
+    from ..tracks.recipe import FILE_NAME, arguments
 
     files = datasets.find([options.file])
     if len(files) != 1:
         raise DataError(
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
-    reading = Recipe(**_read_options(options, options.file))
+    reading = _read_options(options, options.file)
     advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
     description, found = describe_file(files[0], reading)
     print(description)
@@ -275,12 +276,11 @@ def _extract(options: argparse.Namespace) -> int:
     """Extract the encounters of many days, and print the table of days."""
     from ..core.parallel import cluster
     from ..encounters.days import extract_days
-    from ..tracks.recipe import Recipe
 
     with cluster(options.scheduler, wait=options.wait):
         extraction = extract_days(
             options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude,
-            recipe=Recipe(**_read_options(options, options.data)), area=options.area, has_walls=options.walls,
+            recipe=_read_options(options, options.data), area=options.area, has_walls=options.walls,
         )  # fmt: skip
     print(extraction)
     return 1 if len(extraction.failed) else 0
@@ -289,7 +289,6 @@ def _extract(options: argparse.Namespace) -> int:
 def _fit(options: argparse.Namespace) -> int:
     """Fit a zone to extracted days or tracks."""
     from ..encounters.settings import EncounterSettings
-    from ..tracks.recipe import Recipe
     from .fit_command import fit
 
     given = {
@@ -300,7 +299,7 @@ def _fit(options: argparse.Namespace) -> int:
     print(
         fit(
             options.data,
-            reading=Recipe(**_read_options(options, options.data)),
+            reading=_read_options(options, options.data),
             **given,
         )
     )

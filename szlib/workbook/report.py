@@ -250,7 +250,7 @@ def _find_players(notebooks: Mapping[str, Any]) -> dict[str, str]:
         for data in _list_data(cell)
     ]
     figures = {
-        alt.partition(":")[0]: figure
+        alt.rpartition(":")[0]: figure
         for figure, alt in reversed(_PLAYER.findall("".join(html)))
     }
     titles = {s.title: s.name.replace("_", " ") for s in SCENARIOS.values()}

@@ -12,6 +12,7 @@ import yaml
 from bs4 import BeautifulSoup
 
 import szlib
+from szlib.core.files import claim_folder
 
 ROOT = Path(__file__).parents[2]
 pytest.importorskip("myst_nb")
@@ -22,7 +23,14 @@ def folder(tmp_path_factory):
     """The site with one notebook."""
     folder = tmp_path_factory.mktemp("site")
     (ROOT / ".docs" / "pages").mkdir(exist_ok=True)
-    options = ["-q", "-c", ".docs", "-d", str(folder / "doctrees"), ".docs/pages"]
+    options = [
+        "-q",
+        "-c",
+        ".docs",
+        "-d",
+        str(folder / "html" / ".doctrees"),
+        ".docs/pages",
+    ]
     subprocess.run(
         [sys.executable, "-m", "sphinx", *options, str(folder / "html")],
         cwd=ROOT, env=os.environ | {"SZLIB_DOCS_NOTEBOOKS": "07*", "SZLIB_REPOSITORY": "me/szlib"},
@@ -40,6 +48,11 @@ def pages(folder):
         )
         for file in folder.glob("**/*.html")
     }
+
+
+def test_the_site_may_lie_among_the_results_of_runs(folder):
+    claim_folder(folder.parent, "results of the workbook")
+    assert not (folder.parent / "jupyter_execute").exists()
 
 
 def test_each_public_name_has_an_entry_and_each_parameter_a_meaning(pages):

@@ -314,14 +314,13 @@ def test_invalid_number_of_jobs_is_refused(jobs, capsys):
     assert "expected a whole number >= 1" in capsys.readouterr().err
 
 
-def test_missing_packages_are_named(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "nbclient", None)
-    monkeypatch.delitem(sys.modules, "szlib.workbook.execution")
-    monkeypatch.delitem(sys.modules, "szlib.workbook.runner")
-    assert main(["run"]) == 2
-    assert (
-        "nbclient is missing: pip install 'szlib[workbook]'" in capsys.readouterr().err
-    )
+def test_missing_packages_are_named(notebooks, monkeypatch, capsys):
+    notebooks(_01_one="")
+    monkeypatch.setitem(sys.modules, "ipykernel.kernelspec", None)
+    for name in ("execution", "runner"):
+        monkeypatch.delitem(sys.modules, f"szlib.workbook.{name}")
+    assert run() == 2
+    assert "is missing: pip install 'szlib[workbook]'" in capsys.readouterr().err
 
 
 def test_missing_notebooks_are_explained(notebooks):

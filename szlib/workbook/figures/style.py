@@ -12,12 +12,9 @@ import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path
 
 from ...control.obstacles import Obstacle, Wall
 from ...core.checks import Array
-from ...encounters.geometry import Area
 
 BLUE, ORANGE, GREEN = "#0072B2", "#E69F00", "#009E73"
 RED, GREY, BLACK = "#D55E00", "#999999", "#000000"
@@ -25,13 +22,6 @@ SEQUENCE = "viridis"
 # Points on each side of the grid on which the outline of an obstacle is found.
 _GRID = 201
 _CHORD_ERROR = 1e-3  # distance of a corner of this outline that may be left out [m]
-ARROW: dict[str, Any] = {
-    "angles": "xy",
-    "scale_units": "xy",
-    "scale": 1,
-    "width": 0.008,
-    "zorder": 3,
-}
 
 
 def pick_colours(values: Sequence[Any]) -> list[Any]:
@@ -86,12 +76,6 @@ def label_metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
         ax.set_title(title)
     ax.set_aspect("equal")
     return ax
-
-
-def area_patch(area: Area, **style: Any) -> PathPatch:
-    """Return the borders of `area`, with its holes, as one patch; `style` as for matplotlib's PathPatch."""
-    rings = [Path(ring, closed=True) for ring in area.outlines]
-    return PathPatch(Path.make_compound_path(*rings), fill=False, **style)
 
 
 def add_legend_below(ax: Axes, *, gap: float = 0.13, ncols: int = 2) -> Legend:
