@@ -379,21 +379,6 @@ def test_the_keywords_of_the_paper_are_there() -> None:
     assert {"gamma", "N", "N_h", "dt", "pass_side"} <= parameters(szlib.MPCSettings)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="kernels are forked on Linux")
-def test_what_forked_kernels_import_starts_no_threads_of_polars() -> None:
-    """A kernel that is forked after them would wait for ever."""
-    code = (
-        "from importlib import import_module as load\n"
-        "from pathlib import Path\n"
-        "[load(name) for name in load('szlib.workbook.kernel')._PRELOADED]\n"
-        "print(*(f.read_text().strip() for f in Path('/proc/self/task').glob('*/comm')))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], check=True, capture_output=True, text=True
-    )
-    assert "python" in done.stdout and not re.search(r"polars-\d", done.stdout)
-
-
 def test_ready_made_environments_name_what_exists() -> None:
     """A container and Binder install versions of the lock, and a workflow calls commands that exist."""
     root = PACKAGE.parent

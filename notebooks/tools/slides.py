@@ -20,6 +20,7 @@ import shutil
 import struct
 from base64 import b64decode
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from pathlib import Path
 
@@ -222,7 +223,12 @@ class HandoutExporter(WebPDFExporter):
     """nbconvert's webpdf with the Chromium of this machine, whose pages ask no server."""
 
     def run_playwright(self, html: str) -> bytes:
-        """The page as PDF."""
+        """The page as PDF; a thread of its own has no loop of a notebook."""
+        with ThreadPoolExecutor(1) as pool:
+            return pool.submit(self.print_page, html).result()
+
+    def print_page(self, html: str) -> bytes:
+        """The page as PDF, in a thread without a loop."""
         from playwright.sync_api import sync_playwright
 
         with sync_playwright() as driver:

@@ -190,7 +190,12 @@ def _check_guard(
 
 
 def measure_way(scene: Any, path: Array, times: Array) -> tuple[Array, float, float]:
-    """Measure the way of a step, shape (n, 2), with the formulas of this module.
+    """Measure the way of a step with the formulas of this module.
+
+    Parameters
+    ----------
+    scene : of the step.
+    path, times : points of the way, shape (n, 2) [m], and when the robot is there, shape (n,) [s].
 
     Returns h now, shape (obstacles,), the smallest gap, as of `Report.gap`, -inf in a solid wall, and the
     smallest of it and of h now and at the end [m].

@@ -36,6 +36,8 @@ REFUSED = {
     "DeadKernelError",
 }  # fmt: skip
 INLINE = "module://matplotlib_inline.backend_inline"  # the backend that shows figures in a notebook
+# of temporary files [characters]: in a longer one the server of forks has no room for its socket
+_LONGEST_FOLDER = 70
 # Nothing of it imports polars, whose threads a fork does not survive.
 PRELOADED = [
     "ipykernel.kernelapp", "matplotlib.pyplot", "sklearn.neighbors", "pandas.io.formats.style",
@@ -155,7 +157,8 @@ class OwnKernelManager(AsyncKernelManager):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        if sys.platform == "linux":
+        folder = tempfile.gettempdir()
+        if sys.platform == "linux" and len(folder) < _LONGEST_FOLDER:
             spec = self.kernel_spec
             self.provisioner = ForkingProvisioner(kernel_spec=spec, parent=self)
 

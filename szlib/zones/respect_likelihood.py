@@ -43,6 +43,7 @@ _PARAMETERS = [
     (*np.log([0.08, 0.6, 1.0]), np.inf),  # log c [m]
 ]
 _LOW, _HIGH, _MEAN, _SPREAD = np.transpose(_PARAMETERS)
+_REPORTED = 9  # the ellipse, and the share f of careless people
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
 _BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
@@ -332,7 +333,7 @@ class Likelihood:
         weights = self.power * self.weights
         tempered = replace(self, weights=weights, is_fast=True)
         with threads().limit(limits=1):
-            return sample(tempered.cost, start, _LOW, _HIGH, rng)
+            return sample(tempered.cost, start, _LOW, _HIGH, rng, n_reported=_REPORTED)
 
 
 @cache

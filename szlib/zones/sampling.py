@@ -3,8 +3,8 @@
 Each chain follows the gradient, so that its draws are nearly independent (Neal, "MCMC using Hamiltonian
 dynamics", 2011). Parameters have bounds, and are drawn on the whole real line by a logit. The steps fit the
 curvature at the maximum, then the covariance of the draws so far. The chains end when the largest R-hat is
-below 1.01 and each parameter has 400 effective draws (Vehtari et al., Bayesian Analysis 16, 2021), or after
-`_MOST_BLOCKS` blocks.
+below 1.01 and each parameter that is reported has 400 effective draws (Vehtari et al., Bayesian Analysis 16,
+2021), or after `_MOST_BLOCKS` blocks.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from ..core.checks import Array
 Cost = Callable[[Array], tuple[float, Array]]
 
 R_HAT, EFFECTIVE = 1.01, 400
-_CHAINS, _BLOCK, _MOST_BLOCKS = 4, 60, 12
-_STEPS = (2, 8)  # of the leapfrog, least and less than
+_CHAINS, _BLOCK, _MOST_BLOCKS = 4, 60, 16
+_ADAPTING = 3  # blocks before the first draw; the last one adapts the step only
+_STEPS = (3, 10)  # of the leapfrog, least and less than
 _ACCEPTED, _RATE = (
     0.8,
     0.1,
@@ -37,7 +38,7 @@ class Draws:
     Parameters
     ----------
     values : the draws, shape (k, d).
-    r_hat, n_effective : the largest R-hat, and the fewest effective draws, of a parameter.
+    r_hat, n_effective : the largest R-hat, and the fewest effective draws, of a reported parameter.
     """
 
     values: Array
@@ -91,7 +92,13 @@ class _Space:
 
 
 def sample(
-    cost: Cost, start: Array, low: Array, high: Array, rng: np.random.Generator
+    cost: Cost,
+    start: Array,
+    low: Array,
+    high: Array,
+    rng: np.random.Generator,
+    *,
+    n_reported: int,
 ) -> Draws:
     """Draw from the density exp(-cost) between bounds.
 
@@ -101,15 +108,17 @@ def sample(
     start : the maximum of the density, or near it, shape (d,).
     low, high : bounds of the parameters, shape (d,).
     rng : of the draws.
+    n_reported : the chains must agree about so many parameters, the first ones.
     """
     space = _Space(cost, np.asarray(start, float), low, high)
     space.fit_curvature()
     z = rng.normal(0, 1, (_CHAINS, len(start)))
     step = 0.3
-    for _ in range(2):
+    for block in range(_ADAPTING):
         chains, step = _run(space, z, step, rng, adapts=True)
         u = space.center + chains @ space.root.T
-        space.fit_draws(u[:, _BLOCK // 3 :].reshape(-1, len(start)))
+        if block < _ADAPTING - 1:
+            space.fit_draws(u[:, _BLOCK // 3 :].reshape(-1, len(start)))
         z = np.linalg.solve(space.root, (u[:, -1] - space.center).T).T
     blocks: list[Array] = []
     while len(blocks) < _MOST_BLOCKS:
@@ -117,7 +126,7 @@ def sample(
         z = chains[:, -1]
         blocks.append(chains)
         draws = np.concatenate(blocks, axis=1)
-        found = Draws(space.parameters(draws), *diagnose(draws))
+        found = Draws(space.parameters(draws), *diagnose(draws[..., :n_reported]))
         if found.has_converged:
             break
     return Draws(found.values.reshape(-1, len(start)), found.r_hat, found.n_effective)

@@ -17,7 +17,8 @@ def gaussian(p: np.ndarray) -> tuple[float, np.ndarray]:
 
 def test_draws_have_the_moments_of_the_density() -> None:
     wide = np.array([20.0, 20.0])
-    found = sample(gaussian, np.zeros(2), -wide, wide, np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    found = sample(gaussian, np.zeros(2), -wide, wide, rng, n_reported=2)
     assert found.has_converged
     assert found.values.mean(axis=0) == pytest.approx([0, 0], abs=0.05)
     assert np.cov(found.values.T) == pytest.approx(COVARIANCE, rel=0.25)
@@ -26,7 +27,7 @@ def test_draws_have_the_moments_of_the_density() -> None:
 def test_bounds_are_kept_and_a_flat_density_is_flat() -> None:
     found = sample(
         lambda p: (0.0, np.zeros(1)), np.array([0.9]), np.array([0.0]), np.array([1.0]),
-        np.random.default_rng(1),
+        np.random.default_rng(1), n_reported=1,
     )  # fmt: skip
     counts = np.histogram(found.values, bins=4, range=(0, 1))[0] / len(found.values)
     assert counts == pytest.approx(np.full(4, 0.25), abs=0.06)
