@@ -42,7 +42,8 @@ GIVEN = {
 shape = PolarZone([0.7, 1.5], DIRECTIONS, [np.full(72, 0.9), np.full(72, 1.2)])
 zone = szlib.SocialZone(shape, 2.0, {{1.1: {ELLIPSE}}})""",
     "10_corridor": f"""settings, scenario = szlib.MPCSettings(), szlib.SCENARIOS["corridor"]
-controller = szlib.MPCCBF({ELLIPSE}, walls=scenario.walls, settings=settings)
+zone = {ELLIPSE}
+controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)""",
     "13_laboratory": f"zone = {ELLIPSE}",
 }
