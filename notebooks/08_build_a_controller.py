@@ -33,7 +33,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [07](07_barriers.ipynb) · next: [9 - Passing a person who
-# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 40 min ·
+# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 45 min ·
 # needs [07](07_barriers.ipynb) · exercises:
 # [5.5-5.7](exercises/sheet5_barriers.ipynb#5.5-A-filter-on-a-road-(15-min)),
 # [6.1-6.5](exercises/sheet6_controller.ipynb#6.1-MPC-on-a-road-(25-min)),
