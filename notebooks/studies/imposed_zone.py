@@ -23,9 +23,9 @@ from szlib.core.checks import Array, check_columns, require
 from szlib.core.errors import ZoneError
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.kinds import WALKING
+from szlib.encounters.null_model import time_shifted
 from szlib.encounters.samples import SAMPLE_COLUMNS
 from szlib.encounters.settings import EncounterSettings
-from szlib.encounters.time_shift import time_shifted
 from szlib.tracks import funnels
 from szlib.zones.ellipses import Ellipse
 from szlib.zones.outliers import pair_numbers

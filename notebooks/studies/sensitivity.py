@@ -13,7 +13,6 @@ import pandas as pd
 from szlib.core.errors import DataError, DataWarning, ZoneError
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.geometry import Area
-from szlib.encounters.near_rows import select_near_rows
 from szlib.zones.outliers import FRACTION, N_NEIGHBOURS
 from szlib.zones.social_zone import SocialZone
 
@@ -83,7 +82,7 @@ def _variations(
     tracks: pd.DataFrame, area: Area, has_walls: bool, fit: Mapping[str, Sequence[Any]]
 ) -> Iterator[tuple[str, Any, pd.DataFrame, dict[str, Any]]]:
     """Parameter, value, samples and options of the fit, for each variation."""
-    search = partial(find_encounters, select_near_rows(tracks, area, max(SEARCH["duration"])))
+    search = partial(find_encounters, tracks)
     samples = search(area=area, has_walls=has_walls)
     yield "default", "", samples, {}
     for name, values in SEARCH.items():

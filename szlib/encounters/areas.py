@@ -152,13 +152,11 @@ def _find_places(tracks: pd.DataFrame) -> dict[str, str]:
 def walked_area(
     tracks: pd.DataFrame,
     *,
-    cell: float | None = None,
-    n_people: int = _PEOPLE,
     space: AttentionalSpace = PAPER_SPACE,
 ) -> Area:
     """Find the largest rectangle along the axes in which people walked everywhere, or the place's outline.
 
-    Everywhere means: on each square cell at least `n_people` different people walked, at 0.4 m/s or faster.
+    Everywhere means: on each square cell of 0.5 m at least three people walked, at 0.4 m/s or faster.
     The attentional space can turn in the rectangle.  Where few people walked, or such a rectangle is missing,
     or narrow and a small part of the place (small rooms, corridors, oblique views), the area is the outline
     of the place where people were seen.  It may hold spots where nobody walked (furniture, pillars), of
@@ -171,9 +169,6 @@ def walked_area(
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks`.
-    cell : width of a cell [m]; None takes 0.5, or more where few people walked.  It grows with sites wider
-        than 200 m.
-    n_people : number of people who must have walked on each cell.
     space : the attentional space that must fit in.
 
     Returns
@@ -192,16 +187,12 @@ def walked_area(
     'the outline of the place where people were seen, as few people walked'
     """
     check_columns(tracks, COLUMNS)
-    if not ((cell is None or 0.05 <= cell < np.inf) and n_people >= 1):
-        raise DataError(
-            f"expected cell >= 0.05 m and n_people >= 1; got {cell} m, {n_people}"
-        )
     walks = tracks[np.hypot(*tracks[["vx", "vy"]].to_numpy(float).T) >= _WALKING]
     if len(walks) == 0:
         raise DataError(
             f"nobody walks at {_WALKING} m/s or faster in these tracks: no area can be found"
         )
-    count, corner, fine = _count_people(walks, cell or _CELL)
+    count, corner, fine = _count_people(walks, _CELL)
     seen = _find_seen_parts(tracks, corner, fine, count.shape)
     middle, lowest, width = (
         corner[:, None, None] + fine * (np.indices(count.shape) + 0.5),
@@ -209,10 +200,10 @@ def walked_area(
         fine,
     )
     while (
-        is_sparse := cell is None and np.median(count[count > 0]) <= _SPARSE
+        is_sparse := np.median(count[count > 0]) <= _SPARSE
     ) and 2 * width <= _WIDEST:
         count, lowest, width = _count_people(walks, 2 * width)
-    walked = (count >= n_people)[
+    walked = (count >= _PEOPLE)[
         tuple(((middle - lowest[:, None, None]) // width).astype(int))
     ]
     first, end = _largest_rectangle(
@@ -228,7 +219,7 @@ def walked_area(
         (x0, x1), (y0, y1) = (
             (corner + part * np.stack([first, end])).round(6).T.tolist()
         )
-        everywhere = f"on each cell of {width:g} m at least {n_people} people walked"
+        everywhere = f"on each cell of {width:g} m at least {_PEOPLE} people walked"
         return Square(
             (x0, x1), (y0, y1), f"the largest rectangle in which {everywhere}"
         )
@@ -245,7 +236,7 @@ def walked_area(
     middles = seen[_PARTS // 2 :: _PARTS, _PARTS // 2 :: _PARTS]
     if not is_sparse and (share := 1 - walked[middles].mean()) > 0:
         warn(
-            f"in {share:.0%} of the area found ({outline.area:.0f} m2) fewer than {n_people} people walked, "
+            f"in {share:.0%} of the area found ({outline.area:.0f} m2) fewer than {_PEOPLE} people walked, "
             "perhaps for furniture, pillars or walls: look at the map, and give a better area if you know one"
         )
     why = (

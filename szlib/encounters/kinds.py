@@ -30,7 +30,7 @@ import pandas as pd
 from ..core.errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND
-from .occupants import TrackRows
+from .occupants import TrackRows, find_neighbours
 
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
     "companions", "standing", "same direction", "opposite", "crossing",
@@ -93,6 +93,18 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
         f"samples: {', '.join(names)}", len(samples), len(selected), rejected
     )
     return funnels.attach(selected, [*funnels.get(samples), stage])
+
+
+def find_near_pairs(rows: TrackRows, whole: np.ndarray, seconds: float) -> np.ndarray:
+    """Pairs of people who are within `NEAR` [m] at so many `seconds`, or more; their numbers (n, 2).
+
+    `whole` are those of the `rows` (indices, or a mask) that are at a whole second.
+    """
+    found = find_neighbours(rows.x[whole], rows.y[whole], rows.moment[whole], NEAR)
+    near = np.concatenate([np.empty((2, 0), np.intp), *map(np.stack, found)], axis=1)
+    pairs = np.sort(rows.person[whole][near.T], axis=1)
+    pairs, counts = np.unique(pairs, axis=0, return_counts=True)
+    return np.asarray(pairs[counts >= seconds])
 
 
 def kinds_of_pairs(

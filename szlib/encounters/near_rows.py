@@ -1,7 +1,6 @@
-"""The rows of a track table, or of a file, that encounters in an area can depend on.
+"""The rows of a file that encounters in an area can depend on: `read_near_area`.
 
-`select_near_rows` takes them from a track table (one row in six of a mall's day), `read_near_area` from a
-file.  `szlib.find_encounters` finds the same encounters in them as in all rows, bit for bit.
+`szlib.find_encounters` finds the same encounters in them as in all rows, bit for bit.
 
 A raw file is read block by block.  The proof uses these terms: g is the longest gap [s] within a track; 0.1 s
 is the step of the clock; "the square" is the smallest one around the area, grown by the 5 m in which kinds of
@@ -37,7 +36,7 @@ import polars as pl
 
 from ..core import memory
 from ..tracks import funnels
-from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
+from ..tracks.clock import VELOCITY_SPAN
 from ..tracks.plausibility import check_unit
 from ..tracks.readers import (
     LoadedFile,
@@ -53,48 +52,12 @@ from ..tracks.readers import (
 from ..tracks.recipe import Recipe, find_recipe
 from .geometry import Area, Square
 from .kinds import REACH
-from .occupants import TrackRows
 
 NUMBERS = ("t", "id", "x", "y")  # columns of a block: t [s], id, x, y [m]
 _BLOCK_ROWS = 1 << 17  # of one block [about 5 minutes of a raw day]
 # larger than every rounding error of a time [s], position [m]
 _TIME_ROUNDING, _POSITION_ROUNDING = (0.1, 1e-6)
 _ROW_BYTES = 180  # memory of a row near the area until its day is done (15.6 million of them: 2.7 GB)
-
-
-def select_near_rows(tracks: pd.DataFrame, area: Area, duration: float) -> pd.DataFrame:
-    """Select the rows of `tracks`, by person and time, that encounters in the `area` can depend on.
-
-    `szlib.find_encounters` finds the same encounters in them, in this area or in one inside it, with windows
-    of `duration` [s] or less.  The funnel counts the other rows.  Raises DataError as `find_encounters`.
-    """
-    rows = TrackRows.from_tracks(tracks)
-    near = is_near(rows.x, rows.y, rows.person, area, duration)
-    stage = funnels.stage(
-        "near the area", len(near), near.sum(), {"elsewhere": (~near).sum()}
-    )
-    table = tracks.iloc[rows.order[near]].reset_index(drop=True)
-    return funnels.attach(table, [*funnels.get(tracks), stage])
-
-
-def is_near(
-    x: np.ndarray, y: np.ndarray, person: np.ndarray, area: Area, duration: float
-) -> np.ndarray:
-    """Whether encounters in the `area` can depend on each row at `x`, `y` [m]; shape (n,).
-
-    Rows are sorted by `person` (numbered from 0) and time.  Of each person who is in the area at all, these
-    are the rows in the area grown by `REACH` (for kinds of encounter), half a second around them (for
-    velocities), and the `duration` [s] after them (both people must be tracked).
-    """
-    visits = np.zeros(person.max(initial=-1) + 1, bool)
-    visits[person[area.contains(x, y)]] = True
-    inside = area.grown(REACH).contains(x, y) & visits[person]
-    count, row = np.r_[0, np.cumsum(inside)], np.arange(len(inside))
-    after = row + round(VELOCITY_SPAN * TICKS_PER_SECOND)
-    before = row - round(max(duration, VELOCITY_SPAN) * TICKS_PER_SECOND)
-    return np.asarray(
-        count[np.minimum(after + 1, len(row))] > count[np.maximum(before, 0)]
-    )
 
 
 class UnsortedError(Exception):

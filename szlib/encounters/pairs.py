@@ -12,6 +12,11 @@ stream    units with the same direction of travel: one of eight sectors of 45 de
 
 Two people of one stream keep their distance in all shifts, so they tell nothing, and are "same direction".
 Compared are pairs of different streams who come towards each other or cross.
+
+A tracker can fake respect: one that loses one of two people who come near each other leaves no pair nearer
+than the distance that it resolves, as if they kept apart. It shows where tracks end and begin: in a merging
+tracker most tracks that end inside the area do so beside somebody else. So at each distance the share of ends
+with a stranger there is compared with the share of all samples.
 """
 
 from __future__ import annotations
@@ -22,8 +27,10 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.stats import beta
 
 from ..core.checks import require
 from ..core.errors import DataError
@@ -35,21 +42,108 @@ from .kinds import (
     COMPANIONS,
     CROSSING,
     KINDS,
-    NEAR,
     OPPOSITE,
     REACH,
     SAME,
     STANDING,
     TOGETHER,
     classify_motion,
+    find_near_pairs,
     kinds_of_pairs,
     of_kind,
 )
-from .neighbours import find_neighbours
-from .occupants import TrackRows
+from .occupants import TrackRows, find_neighbours
 from .samples import sample_rows
-from .sensors import SensorCheck, check_sensor
 from .settings import EncounterSettings
+
+NEAR_END = 0.6
+"""Distance at which somebody is near the end of a track [m]."""
+
+_EDGES = np.arange(0.2, 1.25, 0.1)  # of the distances at which ends are counted [m]
+_MOST = (
+    2.0  # times as many ends as samples at a distance that a sound tracker has at most
+)
+_FEWEST = 5  # ends that say something
+_SMALL = 0.005  # level at which a distance counts as not resolved
+
+
+@dataclass(frozen=True)
+class SensorCheck:
+    """Ends of tracks inside the area beside somebody else, against all samples.
+
+    Parameters
+    ----------
+    ends, samples : number of beginnings and ends of tracks inside the area, and of all samples there.
+    ends_near, ends_low, ends_high : share of the ends with a stranger within 0.6 m, and its interval.
+    samples_near : the same share of all samples.
+    resolved : distance beyond which no more tracks end than elsewhere [m]; 0: at every distance.
+
+    Examples
+    --------
+    >>> from szlib.encounters import SensorCheck
+    >>> SensorCheck(50, 9000, 0.6, 0.45, 0.73, 0.01, 0.5).loses_people
+    True
+    """
+
+    ends: int
+    samples: int
+    ends_near: float
+    ends_low: float
+    ends_high: float
+    samples_near: float
+    resolved: float
+
+    @property
+    def loses_people(self) -> bool:
+        """Whether tracks end beside other people more often than chance explains."""
+        return self.resolved > 0
+
+    def __str__(self) -> str:
+        return (
+            f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
+            f"of tracks have somebody within {NEAR_END:g} m, and {self.samples_near:.1%} of all samples"
+        )
+
+
+def check_sensor(
+    rows: TrackRows, inside: np.ndarray, one: np.ndarray, other: np.ndarray
+) -> SensorCheck:
+    """Compare the ends of tracks with all samples.
+
+    Parameters
+    ----------
+    rows : of the tracks, by person and time.
+    inside : whether each of them is in the area.
+    one, other : rows of two strangers at one moment who are near each other, shape (n,).
+    """
+    is_end = _find_ends(rows, inside)
+    distance = np.hypot(rows.x[one] - rows.x[other], rows.y[one] - rows.y[other])
+    nearest = np.full(len(rows), np.inf)
+    np.minimum.at(nearest, one, distance)
+    np.minimum.at(nearest, other, distance)
+    ends, samples = nearest[is_end], nearest[inside]
+    resolved = 0.0
+    for low, high in zip(np.r_[0, _EDGES[:-1]], _EDGES, strict=True):
+        k, n = int(((ends >= low) & (ends < high)).sum()), len(ends)
+        expected = (
+            float(((samples >= low) & (samples < high)).mean()) if len(samples) else 0.0
+        )
+        if k >= _FEWEST and beta.ppf(_SMALL, k, n - k + 1) > _MOST * expected:
+            resolved = float(high)
+    k, n = int((ends < NEAR_END).sum()), len(ends)
+    low, high = beta.ppf([0.025, 0.975], [k + 0.5] * 2, [n - k + 0.5] * 2)
+    near = float((samples < NEAR_END).mean()) if len(samples) else 0.0
+    return SensorCheck(
+        n, len(samples), k / max(n, 1), float(low), float(high), near, resolved
+    )
+
+
+def _find_ends(rows: TrackRows, inside: np.ndarray) -> NDArray[np.bool_]:
+    """Whether a track begins or ends at each row inside the area, but for those cut by the recording."""
+    breaks = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
+    recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
+    return np.asarray((np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded)
+
 
 CLOSE = 2.0  # people farther apart [m] do not belong to a zone (paper: r_max)
 
@@ -195,22 +289,12 @@ class Crowd:
     def unit(self) -> np.ndarray:
         """Number of the unit of each person: companions, and companions of companions."""
         n = self.rows.person[-1] + 1
-        one, other = self._near_rows(self.second, NEAR, np.arange(n))
-        person = self.rows.person[self.coarse]
-        pairs = np.sort(np.column_stack([person[one], person[other]]), axis=1)
-        pairs, seconds = np.unique(pairs, axis=0, return_counts=True)
-        pairs = pairs[seconds >= TOGETHER - 1]
+        pairs = find_near_pairs(self.rows, self.coarse, TOGETHER - 1)
         everywhere = np.ones(len(self.rows), bool)
         kinds = kinds_of_pairs(pairs[:, 0], pairs[:, 1], self.rows, everywhere)
         a, b = pairs[np.asarray(kinds == COMPANIONS)].T
         graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
         return np.asarray(connected_components(graph, directed=False)[1])
-
-    @property
-    def unit_sizes(self) -> dict[str, int]:
-        """Number of units by their size."""
-        sizes = np.bincount(np.bincount(self.unit[np.unique(self.rows.person)]))
-        return {str(size): int(n) for size, n in enumerate(sizes) if size and n}
 
     @cached_property
     def stream(self) -> np.ndarray:

@@ -215,7 +215,7 @@ def _notebooks(options: argparse.Namespace) -> int:
 
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
-    from ..encounters.one_day import (
+    from ..encounters.days import (
         FEW_ENCOUNTERS,
         find_encounters_in_files,
         relax_conditions,

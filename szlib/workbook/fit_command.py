@@ -15,24 +15,24 @@ from ..core.errors import DataError, DataWarning, StorageError, ZoneError
 from ..core.files import folder_purpose, write_file
 from ..core.input_files import file_content, printable, read_json_object
 from ..encounters.areas import AUTO
-from ..encounters.days import PURPOSE, Extraction
-from ..encounters.finding import find_encounters
-from ..encounters.kinds import of_kind
-from ..encounters.one_day import (
+from ..encounters.days import (
     FEW_ENCOUNTERS,
+    PURPOSE,
+    Extraction,
     known_area,
     relax_conditions,
     require_encounters,
 )
+from ..encounters.finding import find_encounters
+from ..encounters.kinds import of_kind
 from ..encounters.settings import EncounterSettings
 from ..tracks import datasets
 from ..tracks.clock import read_tracks
 from ..tracks.recipe import Recipe
 from ..zones.outliers import R_MAX
-from ..zones.social_zone import SocialZone
+from ..zones.social_zone import FORMAT, SocialZone
 from ..zones.uncertainty import N_RESAMPLES
 from ..zones.verdict import describe_missing_encounters
-from ..zones.zone_file import FORMAT
 from .folders import require_place
 from .record.data_cache import find_null_model
 

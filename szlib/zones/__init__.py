@@ -12,8 +12,7 @@ respect_likelihood    its likelihood, and the posterior of its parameters
 respect_test          the test of the data against its null model, and the radius over all directions
 uncertainty           encounters by side, and confidence intervals by resampling people
 verdict               whether a zone can be used, and why not
-zone_file             the JSON file of a social zone
-social_zone           `SocialZone`: all of it behind one name
+social_zone           `SocialZone`: all of it behind one name, and its JSON file
 reference_zones       zones of real people that szlib ships: `reference_zone`
 
 `__init__.pyi` beside this file lists the names. Each is imported when it is first used: a robot that needs an

@@ -44,7 +44,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -56,8 +56,8 @@ from ..core.checks import Array, check_columns
 from ..core.errors import ZoneError, warn
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
-from ..encounters.sensors import SensorCheck
-from .outliers import nearest_approaches
+from ..encounters.pairs import SensorCheck
+from .outliers import R_MAX, nearest_approaches
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
@@ -75,82 +75,41 @@ _N_RADII, _N_BINS = 160, 80  # values of R up to there, and bins of r up to r_ma
 _LEVEL = 0.95
 
 
-@dataclass(frozen=True, eq=False)
-class Approaches:
-    """The nearest approach of each encounter of the data and of its null model.
+def collect_approaches(
+    samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0
+) -> pd.DataFrame:
+    """Collect the encounters of `samples` and `null` that came within `excluded_below` [m] to its r_max.
 
-    Parameters
-    ----------
-    nearest : shape (n,) [m].
-    kind : number of the kind of encounter, shape (n,).
-    shift : 0 for the data, 1 to `n_shifts` for the shifts of the null model, shape (n,).
-    n_shifts : number of shifts.
-    r_max : largest distance [m].
+    Returns
+    -------
+    One row for each encounter: nearest [m]; shift, 0 for the data and from 1 on for the shifts; kind, a
+    number. Without a column `kind` in `samples` and `null`, all encounters are of one kind.
+
+    Raises
+    ------
+    DataError : the samples lack a column or are empty.
+    ZoneError : no encounter of the data or of the null model came so near.
     """
-
-    nearest: Array
-    kind: NDArray[np.intp]
-    shift: NDArray[np.intp]
-    n_shifts: int
-    r_max: float
-
-    @classmethod
-    def of(
-        cls, samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0
-    ) -> Approaches:
-        """Collect the encounters of `samples` and `null` that came within `excluded_below` [m] to its r_max.
-
-        Without a column `kind`, all encounters are of one kind. Raises DataError if the samples lack a column
-        or are empty, and ZoneError if no encounter of the data or of the null model came so near.
-        """
-        check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
-        data = (
-            nearest_approaches(samples)
-            .rename(columns={"distance": "nearest"})
-            .assign(shift=-1)
-        )
-        columns = [
-            "nearest",
-            "shift",
-            *(["kind"] if "kind" in data and "kind" in null.encounters else []),
+    check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
+    data = nearest_approaches(samples).rename(columns={"distance": "nearest"})
+    has_kinds = "kind" in data and "kind" in null.encounters
+    columns = ["nearest", "shift", "kind"] if has_kinds else ["nearest", "shift"]
+    counted = [
+        each.loc[
+            (each["nearest"] >= excluded_below) & (each["nearest"] < null.r_max),
+            columns,
         ]
-        counted = [
-            each.loc[
-                (each["nearest"] >= excluded_below) & (each["nearest"] < null.r_max),
-                columns,
-            ]
-            for each in (data, null.encounters)
-        ]
-        if not all(map(len, counted)):
-            raise ZoneError(
-                f"{len(counted[0])} encounters of the data and {len(counted[1])} of the null model came "
-                f"within {excluded_below:g} to {null.r_max:g} m: nothing to test; add data, or more shifts"
-            )
-        both = [
-            np.concatenate([each[name].to_numpy(object) for each in counted])
-            for name in columns
-        ]
-        kind = (
-            pd.factorize(both[2], use_na_sentinel=False)[0]
-            if len(both) == 3
-            else np.zeros(len(both[0]), int)
+        for each in (data.assign(shift=-1), null.encounters)
+    ]
+    if not all(map(len, counted)):
+        raise ZoneError(
+            f"{len(counted[0])} encounters of the data and {len(counted[1])} of the null model came "
+            f"within {excluded_below:g} to {null.r_max:g} m: nothing to test; add data, or more shifts"
         )
-        return cls(
-            both[0].astype(float),
-            kind,
-            1 + both[1].astype(int),
-            null.shifts,
-            null.r_max,
-        )
-
-    def select(self, is_kept: NDArray[np.bool_]) -> Approaches:
-        """The encounters that are kept (`is_kept`)."""
-        return replace(
-            self,
-            nearest=self.nearest[is_kept],
-            kind=self.kind[is_kept],
-            shift=self.shift[is_kept],
-        )
+    both = pd.concat(counted, ignore_index=True)
+    kind = both["kind"].astype(object) if has_kinds else both["shift"] * 0
+    number = pd.factorize(kind, use_na_sentinel=False)[0]
+    return both.assign(kind=number, shift=1 + both["shift"])
 
 
 @dataclass(frozen=True)
@@ -180,18 +139,18 @@ class RespectRadius:
         return f"{self.radius:.2f} m ({self.low:.2f} to {self.high:.2f} m)"
 
 
-def fit_radius(approaches: Approaches) -> RespectRadius:
-    """Fit the radius to `approaches` (see the top of this module)."""
-    width = approaches.r_max / _N_BINS
+def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
+    """Fit the radius (see the top of this module) to `approaches` up to `r_max` [m]: `collect_approaches`."""
+    width = r_max / _N_BINS
     r = (np.arange(_N_BINS) + 0.5) * width
-    is_seen = r > approaches.nearest.min() - width
-    strata = list(_histograms(approaches))
+    is_seen = r > approaches["nearest"].min() - width
+    strata = list(_histograms(approaches, r_max))
     n, m = (sum(float(each[side].sum()) for each in strata) for side in (0, 1))
     if not n:
         raise ZoneError(
             "no kind of encounter is in the data and in its null model as well: nothing to compare"
         )
-    radii = np.arange(_N_RADII) / _N_RADII * _FARTHEST * approaches.r_max
+    radii = np.arange(_N_RADII) / _N_RADII * _FARTHEST * r_max
     edge = expit((r - radii[:, None, None, None]) / np.array(_SOFTNESS)[:, None, None])
     share = np.array(_IGNORING)[:, None]
     g = share + (1 - share) * edge  # by R, w, f and r
@@ -215,16 +174,16 @@ def fit_radius(approaches: Approaches) -> RespectRadius:
     )
 
 
-def _histograms(approaches: Approaches) -> Iterable[tuple[Array, Array]]:
+def _histograms(
+    approaches: pd.DataFrame, r_max: float
+) -> Iterable[tuple[Array, Array]]:
     """Histograms of data and null model over the distance, for each kind that both have."""
-    bins = np.minimum(
-        approaches.nearest / approaches.r_max * _N_BINS, _N_BINS - 1
-    ).astype(int)
-    for kind in np.unique(approaches.kind):
-        is_kind = approaches.kind == kind
+    share = approaches["nearest"].to_numpy() / r_max * _N_BINS
+    binned = approaches.assign(bin=np.minimum(share, _N_BINS - 1).astype(int))
+    for _, of_kind in binned.groupby("kind"):
         real, null = (
-            np.bincount(bins[is_kind & side], minlength=_N_BINS).astype(float)
-            for side in (approaches.shift == 0, approaches.shift > 0)
+            np.bincount(of_kind["bin"][side], minlength=_N_BINS).astype(float)
+            for side in (of_kind["shift"] == 0, of_kind["shift"] > 0)
         )
         if real.any() and null.any():
             yield real, null
@@ -320,57 +279,51 @@ def null_test(
     True
     """
     _warn_about_kinds(samples, null)
-    found = Approaches.of(samples, null, excluded_below=excluded_below)
-    p_value, statistics = _compare(found)
+    found = collect_approaches(samples, null, excluded_below=excluded_below)
+    p_value, statistics = _compare(found, null.shifts)
     sensor, p_beyond = null.sensor, None
     if sensor is not None and sensor.loses_people:
-        far = found.select(found.nearest >= sensor.resolved)
-        p_beyond = _compare(far)[0] if (far.shift == 0).any() else 1.0
+        far = found[found["nearest"] >= sensor.resolved]
+        p_beyond = _compare(far, null.shifts)[0] if (far["shift"] == 0).any() else 1.0
     return NullTest(
         p_value=p_value,
         statistic=float(statistics[0]),
         null_statistics=tuple(map(float, statistics[1:])),
-        n_encounters=int((found.shift == 0).sum()),
-        respect=fit_radius(found),
+        n_encounters=int((found["shift"] == 0).sum()),
+        respect=fit_radius(found, null.r_max),
         excluded_below=float(excluded_below),
         sensor=sensor,
         p_beyond=p_beyond,
-        null_radius=_fit_null_radius(found),
+        null_radius=_fit_null_radius(found, null),
         grouped=float(null.parameters.get("grouped", 0.0)),
     )
 
 
-def _compare(found: Approaches) -> tuple[float, NDArray[np.float64]]:
+def _compare(found: pd.DataFrame, n_shifts: int) -> tuple[float, NDArray[np.float64]]:
     """The p-value, and the statistics of the data and of each shift."""
-    near = found.nearest[:, None] < RADII
-    statistics = _find_deficits(found.shift, near, found.kind, 1 + found.n_shifts)
-    p_value = (1 + (statistics[1:] >= statistics[0]).sum()) / (1 + found.n_shifts)
+    statistics = _find_deficits(found, 1 + n_shifts)
+    p_value = (1 + (statistics[1:] >= statistics[0]).sum()) / (1 + n_shifts)
     return float(p_value), statistics
 
 
-def _fit_null_radius(found: Approaches) -> float:
+def _fit_null_radius(found: pd.DataFrame, null: NullEncounters) -> float:
     """The largest low end of the radius that some shifts have, each against all others [m]; 0: none."""
-    radii = [0.0]
-    for k in range(1, 1 + min(_NULL_DRAWS, found.n_shifts - 1)):
-        others = found.select(found.shift > 0)
-        as_data = np.where(others.shift == k, 0, np.maximum(others.shift, 1))
+    radii, others = [0.0], found[found["shift"] > 0]
+    for k in range(1, 1 + min(_NULL_DRAWS, null.shifts - 1)):
+        as_data = others.assign(shift=others["shift"].where(others["shift"] != k, 0))
         with suppress(ZoneError):  # no encounter of a kind of the others
-            radii.append(fit_radius(replace(others, shift=as_data)).low)
+            radii.append(fit_radius(as_data, null.r_max).low)
     return max(radii)
 
 
-def _find_deficits(
-    shift: NDArray[np.intp],
-    near: NDArray[np.bool_],
-    kind: NDArray[np.intp],
-    shifts: int,
-) -> NDArray[np.float64]:
+def _find_deficits(found: pd.DataFrame, shifts: int) -> NDArray[np.float64]:
     """Largest deficit of near encounters over all radii, for each shift, in standard deviations.
 
-    `near` (n, radii) says whether each encounter is within each radius. The expectation for each kind is the
-    share of all shifts together, drawn without replacement.
+    The expectation for each kind is the share of all shifts together, drawn without replacement.
     """
-    deficit = variance = np.zeros((shifts, near.shape[1]))
+    near = found["nearest"].to_numpy()[:, None] < RADII
+    shift, kind = found["shift"].to_numpy(), found["kind"].to_numpy()
+    deficit = variance = np.zeros((shifts, len(RADII)))
     for each in range(kind.max() + 1):
         is_kind = kind == each
         n = np.bincount(shift[is_kind], minlength=shifts)[:, None]

@@ -7,13 +7,18 @@ paper     (nearly) no person was ever inside: outliers, hull, slices, smallest e
 hull      the same, but whole encounters are outliers, as many as there are (ours)
 respect   careful people keep out, compared with people who ignore each other
 
+A zone is written to a JSON file as a whole or not at all, with a checksum of its content, which is checked
+when it is read.
+
 It also estimates how certain the zone is: intervals, the number of encounters on each side, and the speeds at
 which this number is sufficient.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -24,15 +29,19 @@ import pandas as pd
 
 from .. import __version__
 from ..core.checks import Array, check_columns, require
-from ..core.errors import ZoneError, warn
+from ..core.errors import SzlibError, ZoneError, warn
+from ..core.files import write_file
+from ..core.input_files import read_small, reading
 from ..encounters.null_model import NullEncounters
+from ..encounters.pairs import SensorCheck
 from .ellipses import Ellipse
 from .estimators import Estimator, ZoneShape
 from .hulls import HullEstimator, HullZone
 from .outliers import FRACTION, N_NEIGHBOURS, R_MAX, encounter_numbers
+from .polar import PolarZone
 from .quantile import QuantileEstimator
 from .respect import RespectEstimator
-from .respect_test import NullTest, null_test
+from .respect_test import NullTest, RespectRadius, null_test
 from .uncertainty import (
     N_RESAMPLES,
     QUANTITIES,
@@ -42,13 +51,15 @@ from .uncertainty import (
     estimate_uncertainty,
 )
 from .verdict import Verdict, describe_missing_encounters, judge
-from .zone_file import read_zone, write_zone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
+
+FORMAT, VERSION = "szlib.SocialZone", 4
+UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
 # The methods of `SocialZone.fit`: the estimator, and its options.
 METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
@@ -377,12 +388,28 @@ class SocialZone:
 
     def save(self, path: str | Path) -> None:
         """Write the zone as JSON to the file `path`, as a whole or not at all."""
-        write_zone(Path(path), vars(self), {v: self.verdict(v) for v in self.ellipses})
+        _write(self, Path(path))
 
     @classmethod
     def load(cls, path: str | Path) -> SocialZone:
-        """Read a zone that `save` wrote to the file `path`; raises ZoneError if it is damaged or no zone."""
-        return read_zone(Path(path), cls)
+        """Read a zone that `save` wrote to the file `path`.
+
+        Raises ZoneError if the file holds no zone, is damaged, or was written by another version of szlib.
+        """
+        content = _read_content(Path(path))
+        try:
+            return cls(**_fields(content))
+        except (
+            KeyError,
+            TypeError,
+            IndexError,
+            ValueError,
+            OverflowError,
+            AttributeError,
+        ) as error:
+            raise ZoneError(
+                f"{path}: the zone in it is damaged ({error!r}); fit and save it again"
+            ) from error
 
 
 def recorded_hours(samples: pd.DataFrame) -> float | None:
@@ -404,3 +431,135 @@ def _check_method(method: str, options: Iterable[str] = ()) -> None:
             for each, (_, names) in METHODS.items()
         )
         raise ZoneError(f"method {method!r} has no option {name!r}; {known}")
+
+
+def _write(zone: SocialZone, path: Path) -> None:
+    """Write the `zone`, and its verdicts, to `path`; raises ZoneError if the file cannot be written.
+
+    The verdicts are for other programs: when the file is read, they are made again.
+    """
+    shape = zone.shape
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "units": UNITS,
+        "method": zone.method,
+        "r_max": zone.r_max,
+        "ellipses": [
+            {"speed": v, "center": e.center, "semi_axes": e.semi_axes, "angle": e.angle}
+            for v, e in sorted(zone.ellipses.items())
+        ],
+        "undefined": [
+            {"speed": v, "why": reason} for v, reason in sorted(zone.undefined.items())
+        ],
+        "provenance": zone.provenance,
+        "side_counts": zone.side_counts,
+        "uncertainty": zone.uncertainty,
+        "null_test": zone.null_test,
+        "verdicts": [
+            {"speed": v, "verdict": each, "reasons": each.reasons}
+            for v, each in ((v, zone.verdict(v)) for v in zone.ellipses)
+        ],
+        "radii": shape if isinstance(shape, PolarZone) else None,
+        "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
+    }
+    try:
+        content = json.loads(json.dumps(content, default=_to_json))
+        content["checksum"] = _checksum(content)
+        write_file(path, json.dumps(content, indent=1))
+    except (SzlibError, OSError, TypeError, ValueError) as error:
+        raise ZoneError(
+            f"{path}: cannot write the zone ({error}); choose a file in a folder that exists and is "
+            "writable, and use only JSON values in the provenance"
+        ) from error
+
+
+def _read_content(path: Path) -> dict[str, Any]:
+    """The content of the file at `path`: a zone of a known version, undamaged."""
+    with reading(path, "as a zone", "JSON written by SocialZone.save", ZoneError):
+        content = json.loads(read_small(path))
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise ZoneError(
+            f'{path}: is JSON but no zone; expected "format": "{FORMAT}", as SocialZone.save writes it'
+        )
+    if content.get("version") != VERSION:
+        raise ZoneError(
+            f"{path}: has format version {content.get('version')!r}, this szlib {__version__} reads "
+            f"{VERSION}; install the szlib that wrote it, or fit the zone again"
+        )
+    expected = content.pop("checksum", None)
+    if expected != _checksum(content):
+        raise ZoneError(
+            f"{path}: the zone in it is damaged: its checksum is {expected!r}, which is not that of its "
+            "content; do not edit zone files: fit and save the zone again"
+        )
+    return content
+
+
+def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
+    r_max, side_counts = float(content["r_max"]), content["side_counts"]
+    uncertainty, null_test = content["uncertainty"], content["null_test"]
+    if uncertainty is not None:
+        tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands")}
+        uncertainty = Uncertainty(**{**uncertainty, **tables})
+    if null_test is not None:
+        statistics = tuple(map(float, null_test["null_statistics"]))
+        respect = RespectRadius(**null_test["respect"])
+        sensor = null_test.get("sensor")
+        null_test |= {
+            "null_statistics": statistics,
+            "respect": respect,
+            "sensor": None if sensor is None else SensorCheck(**sensor),
+        }
+        null_test = NullTest(**null_test)
+    return {
+        "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
+        if content["radii"] is None
+        else PolarZone(
+            **{
+                name: np.array(values, float)
+                for name, values in content["radii"].items()
+            }
+        ),
+        "r_max": r_max,
+        "ellipses": {
+            float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"])
+            for e in content["ellipses"]
+        },
+        "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
+        "provenance": dict(content["provenance"]),
+        "method": str(content["method"]),
+        "side_counts": None if side_counts is None else _table(side_counts),
+        "uncertainty": uncertainty,
+        "null_test": null_test,
+    }
+
+
+def _checksum(content: Mapping[str, Any]) -> str:
+    """SHA-256 of everything else in the file."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _table(content: Mapping[str, Any]) -> pd.DataFrame:
+    table = pd.DataFrame(content)
+    numbers = table.columns.intersection(["speed", "direction", "low", "high"])
+    return table.astype(dict.fromkeys(numbers, float))
+
+
+def _to_json(value: Any) -> Any:
+    """JSON values of a table, array or group of fields; NaN is null and infinity "Infinity"."""
+    if isinstance(value, pd.DataFrame):
+        return {name: column.to_numpy() for name, column in value.items()}
+    if isinstance(
+        value, Uncertainty | NullTest | RespectRadius | SensorCheck | PolarZone
+    ):
+        return vars(value)
+    if isinstance(value, np.generic):
+        return value.item()
+    if not isinstance(value, np.ndarray):
+        raise TypeError(f"{type(value).__name__} is no JSON value")
+    out = value.astype(object)
+    if value.dtype.kind == "f":
+        out[np.isnan(value)], out[np.isposinf(value)] = None, "Infinity"
+    return out.tolist()

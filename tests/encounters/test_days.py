@@ -25,7 +25,6 @@ from helpers.faulty_disk import FaultyDisk
 import szlib
 from szlib.core.files import claim_folder
 from szlib.encounters import days as extraction
-from szlib.encounters import one_day
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
@@ -190,7 +189,7 @@ def test_rows_are_of_the_bytes_of_their_checksum(
         (tmp_path / name).mkdir()
         (tmp_path / name / days[0].name).write_bytes(day.read_bytes())
     file, known = tmp_path / "data" / days[0].name, threading.Event()
-    describe, read = extraction.describe_source, one_day.read_near_area
+    describe, read = extraction.describe_source, extraction.read_near_area
 
     def describe_first(*given: Any) -> dict[str, Any]:
         try:
@@ -204,7 +203,7 @@ def test_rows_are_of_the_bytes_of_their_checksum(
             return read(*given, **options)
 
     monkeypatch.setattr(extraction, "describe_source", describe_first)
-    monkeypatch.setattr(one_day, "read_near_area", read_the_other)
+    monkeypatch.setattr(extraction, "read_near_area", read_the_other)
     done = extract(file, tmp_path / "out")
     stored = {
         name: content

@@ -10,7 +10,7 @@ from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.core.errors import DataError
-from szlib.encounters.time_shift import COMPANION_SEPARATION, ShiftableTracks
+from szlib.encounters.null_model import COMPANION_SEPARATION, ShiftableTracks
 from szlib.tracks import funnels
 from szlib.tracks.clock import check_tracks, nearest_tick
 

@@ -12,7 +12,7 @@ from helpers.track_tables import real_data
 from studies import quality
 
 import szlib
-from szlib.encounters.one_day import find_encounters_in_files
+from szlib.encounters.days import find_encounters_in_files
 from szlib.tracks import funnels
 
 CONVENTIONS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}

@@ -13,7 +13,7 @@ import shapely
 from helpers.track_tables import make_crowd, make_hall, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.one_day import require_encounters
+from szlib.encounters.days import require_encounters
 from szlib.workbook import folders
 from szlib.workbook.cli import main
 from szlib.workbook.record import NotebookRecord

@@ -14,7 +14,7 @@ from studies.imposed_zone import PairedSamples
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
-from szlib.zones.respect_test import Approaches, fit_radius
+from szlib.zones.respect_test import collect_approaches, fit_radius
 from szlib.zones.verdict import describe_missing_encounters
 
 SHIFTS, SPEED = 39, 1.1
@@ -253,7 +253,9 @@ def test_controller_warns_unless_usable(careful: szlib.SocialZone) -> None:
 @pytest.mark.parametrize("core", [0.5, 0.8, 1.0])
 def test_core_is_found_and_held(core: float) -> None:
     radii = [
-        fit_radius(Approaches.of(walkers(k, 400, core=core, careless=0.05), null()))
+        fit_radius(
+            collect_approaches(walkers(k, 400, core=core, careless=0.05), null())
+        )
         for k in range(30)
     ]
     assert np.mean([each.radius for each in radii]) == pytest.approx(core, abs=0.03)
@@ -264,12 +266,12 @@ def test_core_is_found_and_held(core: float) -> None:
 def test_radius_does_not_shrink_as_encounters_are_added() -> None:
     small = [
         fit_radius(
-            Approaches.of(walkers(k, 150, core=0.8, careless=0.05), null())
+            collect_approaches(walkers(k, 150, core=0.8, careless=0.05), null())
         ).radius
         for k in range(20)
     ]
     many = fit_radius(
-        Approaches.of(walkers(7, 8000, core=0.8, careless=0.05), null())
+        collect_approaches(walkers(7, 8000, core=0.8, careless=0.05), null())
     ).radius
     assert np.mean(small) == pytest.approx(many, abs=0.04)
 
@@ -284,8 +286,8 @@ def test_mix_of_kinds_does_not_matter() -> None:
     crossing = crossing.assign(encounter=crossing["encounter"] + 10_000)
     opposite = walkers(9, 900).assign(kind="opposite")
     opposite["distance"] = np.hypot(opposite["distance"], 1.2)
-    crossing_only = fit_radius(Approaches.of(crossing, null()))
-    both = fit_radius(Approaches.of(pd.concat([crossing, opposite]), mixed))
+    crossing_only = fit_radius(collect_approaches(crossing, null()))
+    both = fit_radius(collect_approaches(pd.concat([crossing, opposite]), mixed))
     assert crossing_only.low == 0
     assert both.low == 0
 

@@ -16,7 +16,7 @@ from ... import __version__
 from ...core.errors import DataError, ZoneError
 from ...core.files import load_cached, store_cached, write_checksum
 from ...core.input_files import file_content, printable, unchanged_files
-from ...encounters import one_day
+from ...encounters import days
 from ...encounters.areas import as_area, place_apart
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
@@ -101,7 +101,7 @@ class DataCache:
             tracks = read_tracks(files, recipe=options)
             return (
                 tracks
-                if one_day.known_area(settings, files, options)
+                if days.known_area(settings, files, options)
                 else place_apart(tracks)
             )
 
@@ -113,7 +113,7 @@ class DataCache:
         settings = self.method.encounter_settings(self.area or None)
         options = self.method.read_options()
         with self._unchanged_data() as files:
-            return as_area(one_day.with_area(settings, files, options, tracks).area)
+            return as_area(days.with_area(settings, files, options, tracks).area)
 
     def encounters(self) -> pd.DataFrame:
         """The encounters that notebook 02 stored, or the same found now."""
@@ -131,13 +131,13 @@ class DataCache:
         """
         advice = ""
         if (
-            samples["encounter"].nunique() < one_day.FEW_ENCOUNTERS
+            samples["encounter"].nunique() < days.FEW_ENCOUNTERS
             and "area" in samples.attrs
         ):
-            advice = one_day.relax_conditions(
+            advice = days.relax_conditions(
                 samples, self.tracks(), self.method.encounter_settings()
             )
-        one_day.require_encounters(samples, advice).attrs["advice"] = advice
+        days.require_encounters(samples, advice).attrs["advice"] = advice
         content = io.BytesIO()
         samples.to_parquet(content)
         store_cached(
