@@ -82,14 +82,14 @@
 # - [Reference](reference.md): all notebooks, words, symbols and parameters; what is not in the paper; related work.
 # - [Which estimator, which settings?](which_settings.md): for tracks or a robot of your own.
 #
+# JupyterLab opens both as text: click on it with the right button, and choose *Show Markdown Preview*.
+#
 # - Open it without installing: [Binder](https://mybinder.org/v2/gh/OWNER/szlib/main?labpath=notebooks/00_start_here.ipynb), or
 #   [Colab](https://colab.research.google.com/github/OWNER/szlib/blob/main/notebooks/00_start_here.ipynb), where a first cell has to be
 #   `!git clone https://github.com/OWNER/szlib && pip install ./szlib[workbook]`, then `%cd szlib/notebooks`. (OWNER stands for the
 #   public address, which is still to come.)
 # - JupyterLab lists each notebook twice. `.ipynb` is the one to open: it holds the pictures. `.py` is its text: for comparing
 #   versions, for searching, and for editors. Saving one changes the other.
-#
-# JupyterLab opens both as text: click on it with the right button, and choose *Show Markdown Preview*.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook

@@ -24,7 +24,7 @@
 # %% [markdown]
 # # 3 - Outliers
 #
-# **Question.** Some people brush past each other, and some tracks are wrong. Which samples to believe?
+# **Question.** Some people brush past each other, and some tracks are wrong. Which samples can we believe?
 #
 # **Expectation.** The paper's rule of 0.2 % finds single errors, and misses people who intrude slowly.
 

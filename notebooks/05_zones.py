@@ -50,7 +50,7 @@ area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, o
 seed = 0
 results = "../results"
 r_max = 2.0  # as in chapter 03 [m]
-q = 0.05  # share of encounters that may enter the quantile zone
+q = 0.05  # share of the encounters in a direction that may enter the quantile zone there
 zone_speed = 1.1  # whose zone the robot keeps [m/s]
 
 # %% jupyter={"source_hidden": true}
@@ -115,7 +115,7 @@ record.figure(fig, "zone")
 # Parameters, with sources
 parameters(
     [
-        ("q", q, ASSUMED, "share of encounters that may enter the quantile zone"),
+        ("q", q, ASSUMED, "share of the encounters in a direction that may enter the zone there"),
         ("sector", "35 deg", ASSUMED, "25 to 45 deg do as well"),
         ("speeds pooled", "0.2 m/s slower to faster", ASSUMED, "few people walk at exactly one speed"),
         ("the robot's zone", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
@@ -154,7 +154,7 @@ real_day.compare_with_plaza(
 #
 # - $\theta$ is the direction, seen from the reference pedestrian. Only encounters in which the other person was seen
 #   there count, each once, with its nearest approach there.
-# - $q$ is the share of encounters that may enter the zone.
+# - $q$ is the share of these encounters that may enter the zone there.
 
 # %% [markdown]
 # ## The quantile zone in ten lines
@@ -350,8 +350,8 @@ record.figure(fig, "sizes")
 #
 # Any method finds a zone, in any data. So the library states in words whether it can be used:
 #
-# - **usable**: people avoid each other more than by chance, there are at least 600 encounters and 20 on each side, and
-#   every interval can be given;
+# - **usable**: people avoid each other more than by chance, there are at least 600 encounters and 20 on each side, no
+#   interval is wide, and the zone is clearly larger than bodies that touch and than what the sensor alone explains;
 # - **undecided**: something is missing, and the reasons say what;
 # - **no respect shown**: people came as near as people who ignore each other.
 #

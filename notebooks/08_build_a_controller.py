@@ -465,8 +465,8 @@ record.key["largest difference of an acceleration [m/s²]"] = float(table.to_num
 # person. SQP finds the best one near its first guess, the last plan. `MPCSettings()` adds the *rule of the side*
 # (chapter 09); the paper has no such rule.
 #
-# **A plan need not exist** (chapter 07). Your robot then goes on with its last plan. The library solves again with a
-# penalised *slack*, and flags the step (notebook 21).
+# **A plan need not exist** (chapter 07). Your robot then goes on with its last plan. The library takes a plan that violates
+# the rows as little as possible, by their priorities (below), and flags the step (notebook 21).
 
 # %% [markdown]
 # **A wish and a duty.** A *control Lyapunov function* $V$ is for goals what $h$ is for people: $V$ is 0 at the goal, positive
@@ -535,7 +535,7 @@ for price in (0.5, 1.4, 1.6):
 # From $p = 2\,(1 - 0.25) = 1.5$ on it does not give way. This is the multiplier of the row, its *price* above. A penalty $p\,s$
 # with a larger $p$ is **exact**; $p\,s^2$ never is. But multipliers differ from step to step, so a fixed $p$ is too small some
 # time, and a huge one spoils the numbers. The library therefore has **priorities**: it first makes the violation of walls as small as
-# possible, then that of bodies, then of zones, and only then the cost.
+# possible, then that of bodies, then of zones, then of eq. 1, and only then the cost.
 #
 # **Exercise.** Why is $p\,s^2$ never exact?
 # <details><summary>Answer</summary>At $s = 0$ its slope is 0: to give way a little is free, but it gains at the rate of the
@@ -559,7 +559,8 @@ record.check("the goal gives way, the barrier does not", all(wishes), wishes, al
 # Nothing has to be installed for this: the runs are recorded in the page. Choose, press *play*, step, or move the time
 # line. The green area holds all accelerations that the robot may choose then, and the sentence says why it chose this one.
 #
-# **What do you think?** A person comes at 0.8 m/s. gamma grows from 0.05 to 0.8. How many steps ahead, $N_h$, keep h positive? Write it down, then look.
+# **What do you think?** A person comes at 0.8 m/s. gamma grows from 0.05 to 0.8. How many steps ahead ($N_h$) must the robot look so that h does not become negative? Write it
+# down, then look.
 
 # %% jupyter={"source_hidden": true}
 # The recorded laboratory

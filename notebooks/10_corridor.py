@@ -141,7 +141,7 @@ room = free_room(4.6)
 print(f"{100 * room:.0f} cm; in the middle of it h is {100 * room / 2:.0f} cm to the zone and to the wall")
 
 # %% [markdown]
-# So it can pass, with little room. How slow it becomes there depends on who limits it.
+# So it can pass, with little room. How slow it becomes there depends on which row limits it.
 #
 # ## Person or wall?
 #
@@ -182,12 +182,12 @@ Markdown(
 )
 
 # %% [markdown]
-# ## Who holds it, and when
+# ## Which row holds the robot, and when
 #
 # A row of the problem *holds* the robot when the chosen acceleration lies on the limit of this row (the row is
 # *active*): without the row the robot would choose another acceleration. Robot and person are *abeam* when they are
-# side by side. **What do you think?** Who holds the robot first? And does it speed up before, at, or after the moment
-# when both are abeam?
+# side by side. **What do you think?** Which row holds the robot first, the person's or a wall's? And does it speed up
+# before, at, or after the moment when both are abeam?
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -274,10 +274,13 @@ record.figure(fig, "widths")
 # The answer
 narrow = [each for each in widths if strategies[each] == "backs out"]
 text = "none of these corridors" if not narrow else f"corridors up to {max(narrow):g} m wide"
+fits = f"At 3.8 m both would fit, with {100 * free_room(3.8):.0f} cm of room: " * (3.8 in narrow)
+fits += (
+    "with so little h the robot may hardly move, and the person is there before it has squeezed by. "
+    * bool(fits)
+)
 Markdown(
-    f"<details><summary>Answer</summary>\n\nIn {text} the robot goes back and lets the person through. At 3.8 m both would fit, with "
-    f"{100 * free_room(3.8):.0f} cm of room: with so little h the robot may hardly move, and the person is there before it has "
-    f"squeezed by. In the widest corridor it goes {found[8.0]['min_speed']:.2f} m/s at the slowest, as beside a person in the "
+    f"<details><summary>Answer</summary>\n\nIn {text} the robot goes back and lets the person through. {fits}In the widest corridor it goes {found[8.0]['min_speed']:.2f} m/s at the slowest, as beside a person in the "
     f"open ({slowest['person alone']:.2f} m/s).\n\n</details>"
 )
 
@@ -317,7 +320,10 @@ times = ((f"{row['width']:g} m, {row['pace']:g} m/s", row["time"]) for row in re
 Markdown(
     "<details><summary>Answer</summary>\n\nThe narrower the corridor, the later it arrives: "
     + "; ".join(f"{what}: {f'{time:.1f} s' if time else 'not within 30 s'}" for what, time in times)
-    + ". It lets the person out first where the two do not fit side by side.\n\n</details>"
+    + "."
+    + " In the narrowest one it goes back and lets the person out first, although both would fit."
+    * (3.8 in narrow)
+    + "\n\n</details>"
 )
 
 # %% [markdown]

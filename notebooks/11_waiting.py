@@ -193,7 +193,8 @@ holds = log.residual.min(axis=2) <= ACTIVE_RESIDUAL
 between_both = (log.time >= out) & (log.time < enters)
 by_person, by_walls = between_both & holds[:, 0], between_both & ~holds[:, 0] & holds[:, 1:].any(axis=1)
 last = float(log.time[by_person][-1]) if by_person.any() else out
-beside = float(log.h[by_walls, 1:].min()) if by_walls.any() else np.nan
+walls = log.h[by_walls, 1:] if by_walls.any() else np.full((1, 4), np.nan)  # first those of the passage
+passage, beside = walls[:, :2].min(axis=1), walls[:, 2:].min()
 record.check(
     "after the person is out, first the person and then the walls at the mouth hold the robot",
     (by_person | by_walls).sum() > 0.8 * between_both.sum() and by_walls.any(),
@@ -201,10 +202,11 @@ record.check(
 )
 Markdown(
     f"<details><summary>Answer</summary>\n\nBoth, one after the other. The person is out at {out:.1f} s, but the zone still passes "
-    f"beside the robot: the person's row holds it until {last:.1f} s. It has stepped aside, and now stands beside the corner of the "
-    f"mouth, {100 * beside:.0f} cm from where h of the wall is 0. Eq. 1 lets this h fall by {100 * gamma:g} % in a step, which "
-    f"is {gamma * beside / settings.dt:.2f} m/s: so it creeps around the corner, and is in at {enters:.1f} s. The wait for the person "
-    "is short. The way back from the wall is what takes long.\n\n</details>"
+    f"beside the robot: the person's row holds it until {last:.1f} s. Then it comes back, held by two walls that meet at the corner of "
+    f"the mouth. The wall beside the mouth leaves no room ahead: its h is down to {100 * beside:.0f} cm. The way back leads "
+    f"towards the wall of the passage. Eq. 1 lets this h fall by {100 * gamma:g} % in a step: by {gamma * passage[0] / settings.dt:.2f} m/s "
+    f"at first, and by {gamma * passage.min() / settings.dt:.2f} m/s where it is least. So the robot goes around the corner slowly, and is in "
+    f"at {enters:.1f} s. The wait for the person is short. The way around the corner is what takes long.\n\n</details>"
 )
 
 # %% [markdown]
@@ -298,7 +300,7 @@ Markdown(
         if len(late)
         else "With none of these starts the person catches it inside. "
     )
-    + "A plan over the whole passage would know better.\n\n</details>"
+    + "A plan over the whole passage would avoid this.\n\n</details>"
 )
 
 # %% [markdown]

@@ -181,7 +181,7 @@ record.figure(fig, "map")
 
 # %% [markdown]
 # From any cell the way leads *downhill*: to the neighbour that is nearer to the goal. There is no other
-# valley than the goal, so nobody can be caught in a dead end. szlib takes cells of 15 cm and 16 directions. A
+# valley than the goal, so the robot cannot be caught in a dead end. szlib takes cells of 15 cm and 16 directions. A
 # way over cells is a few per cent longer than the shortest one, since it turns by steps.
 #
 # The controller drives towards the farthest point of the way that it sees, at most `lookahead` = 4 m ahead,
@@ -297,8 +297,8 @@ Markdown(
 
 # %% [markdown]
 # **Theory: why a plan cannot change sides.** The optimiser of chapter 08 improves a plan in small steps. Take
-# a plan that passes a person on the left, and one that passes on the right. Whoever bends the first into the
-# second must drag it across the person, where the barrier forbids it. So both are *local* optima, and the
+# a plan that passes a person on the left, and one that passes on the right. To bend the first into the
+# second one must drag it across the person, where the barrier forbids it. So both are *local* optima, and the
 # first guess decides which of them the optimiser finds. Paths with the same ends that can be bent into each
 # other without crossing an obstacle form a *homotopy class*. Each class needs a plan of its own.
 #
@@ -632,14 +632,18 @@ recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer
-rows = [
-    f"y = {r['aside']:g} m, door at {r['door']:g} m: " + (f"{r['time']:.1f} s" if r["time"] else "no arrival")
+arrivals = {(r["aside"], r["door"]): r["time"] or np.inf for r in recording.table}
+nearer = [
+    f"y = {r['aside']:g} m, other door at {r['door']:g} m: {r['time']:.1f} s, least h {r['least_h']:.2f} m"
     for r in recording.table
+    if arrivals[r["aside"], r["door"]] < arrivals[0.0, r["door"]] - 0.1
 ]
+around = ", ".join(f"{arrivals[0.0, door]:.1f} s (at {door:g} m)" for door in (3.3, 4.5))
 Markdown(
-    "<details><summary>Answer</summary>\n\nWatch the path. The times are "
-    + "; ".join(rows)
-    + ".\n\n</details>"
+    "<details><summary>Answer</summary>\n\nWith the person in the middle of the nearer door, y = 0, the robot takes the other "
+    f"one, and arrives after {around}. It is sooner, through the nearer door, with the person at "
+    + ("; ".join(nearer) or "none of these places")
+    + ". Where h < 0 it drives through the zone for a moment: that costs less than the way around.\n\n</details>"
 )
 
 
