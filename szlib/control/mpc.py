@@ -415,7 +415,7 @@ class MPCCBF(Controller):
         begin, spare = path.points[0], self._spare
         wall, wall_seen = self._walls_near.bound(path, are_fixed=True)
         of_bodies: Any = bodies.bound(path)
-        if np.ptp(path.points, axis=0).max() <= AT_REST * self._s.dt:
+        if np.hypot(*np.ptp(path.points, axis=0)) <= AT_REST * self._s.dt:
             of_bodies = np.zeros((2, 0)), np.zeros(0)
         elif bodies.size:
             places = bodies.groups[0].numbers[:, :2]

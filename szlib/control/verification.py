@@ -23,7 +23,8 @@ from .settings import TOLERANCE
 # Two computations of one number may differ by this much, relative to the largest number (at least 1).
 ROUNDING = 1e-7
 _SAMPLES = 17  # times within a step at which gaps are computed
-AT_REST = 1e-3  # a slower robot rests [m/s]
+# A robot that moves less than this for a step is never faster than 1 mm/s within it: it rests [m/s].
+AT_REST = 2.5e-4
 # points of a way and their times, to those of another way
 Carry = Callable[[Array, Array], tuple[Array, Array]]
 
@@ -183,7 +184,7 @@ def _check_guard(
         ends = points[:: _SAMPLES - 1] - points[0]
         nearer = ((places - points[0]) @ ends.T > TOLERANCE).any(axis=1)
         is_hit = np.where(overlaps, nearer, (of_bodies < -TOLERANCE).any(axis=1))
-        rests = np.ptp(points, axis=0).max() <= AT_REST * s.dt
+        rests = np.hypot(*np.ptp(points, axis=0)) <= AT_REST * s.dt
         is_clear.append(bool(rests or not is_hit.any()))
     if step.passively_safe and not any(is_clear):
         yield "the step says that it rests before somebody walks into it; it does not"

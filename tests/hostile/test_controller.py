@@ -8,6 +8,7 @@ import controller as hostile
 import drive
 import numpy as np
 import pytest
+import walls
 
 import szlib
 
@@ -30,6 +31,14 @@ def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
     )
     assert broken(tally) == {}
     assert tally["worlds"] == 5
+
+
+@pytest.mark.parametrize(("island", "place"), [(119, 3)])
+def test_a_world_that_once_broke_a_claim_breaks_none(island, place):
+    """In this one a robot that creeps at 1.05 mm/s was said to rest."""
+    faults = []
+    walls.run_world(walls.find_world(island, place), Counter(), faults.append)
+    assert faults == []
 
 
 @pytest.mark.parametrize("solver", ["sqp", "ipopt"])
