@@ -43,8 +43,8 @@
 # **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for. **Words.**
 # *IPOPT*: the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive control: plan
 # some steps ahead, take the first, plan again; *priority*: what a plan obeys first if it cannot obey all:
-# walls, then bodies, then zones, then decay; *slack*: by how much a row is violated; *SQP*: sequential
-# quadratic programming: solve quadratic problems in a row, each around the last answer.
+# walls, then bodies, then zones, then decay; *SQP*: sequential quadratic programming: solve quadratic
+# problems in a row, each around the last answer.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook

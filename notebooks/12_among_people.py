@@ -37,7 +37,7 @@
 #
 # **Afterwards you can** choose settings for a robot among people and walls, and say where it will not
 # arrive. **Words.** *exact penalty*: a price on violations so high that none is paid where a solution
-# without violations exists.
+# without violations exists; *slack*: by how much a row is violated.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook
