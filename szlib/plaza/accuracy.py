@@ -39,6 +39,8 @@ def precision_and_recall(
             f"expected two arrays of one shape; got {removed.shape} and {intruders.shape}"
         )
     found = removed & intruders
-    precision = float(found[removed].mean()) if removed.any() else np.nan
-    recall = float(found[intruders].mean()) if intruders.any() else np.nan
+    precision, recall = (
+        float(found[each].mean()) if each.any() else np.nan
+        for each in (removed, intruders)
+    )
     return precision, recall

@@ -55,8 +55,7 @@ _NEW_BEARING = 200
 # After so many draws the mean clearance grows as well: companions with small zones walk too near otherwise.
 _GROWS_AFTER = 1000
 _FRAMES = (33, 50)  # time between frames, (shortest, longest) [ms]
-_SHORT_GAP = (0.1, 0.4)  # a gap of 0.5 s ends a track [s]
-_LONG_GAP = (0.6, 1.0)
+_GAPS = ((0.1, 0.4), (0.6, 1.0))  # short and long: one of 0.5 s ends a track [s]
 _HEIGHT = (1.5, 1.8)  # of people [m]
 # of the sensor's own velocity [m/s] and facing angle [rad]
 _VELOCITY_NOISE = 0.45
@@ -145,9 +144,9 @@ def stage_encounters(
         np.select([apart < np.pi / 4, apart > 3 * np.pi / 4], KINDS[:2], KINDS[2]),
         plan,
     )
+    closest = start + settings.lead_time + before
+    columns = {"kind": kind, "start": start, "closest": closest}
     vectors = [walker, walker + offset, speed[:, None] * ahead, other_v, swerve]
-    columns = {"kind": kind, "start": start}
-    columns["closest"] = start + settings.lead_time + before
     columns |= zip(_COLUMNS, np.hstack(vectors).T, strict=True)
     return pd.DataFrame(columns)
 
@@ -268,8 +267,8 @@ def _draw(
     pace = rng.uniform(
         np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit)
     )
-    slow = [rng.uniform(0, _DRIFT, n), speed]
-    pace = np.select([plan == "together", standing], slow, pace)
+    pace = np.where(plan == "together", rng.uniform(0, _DRIFT, n), pace)
+    pace = np.where(standing, speed, pace)
     side = np.where(standing, -np.sign(tangent[:, 0]), rng.choice([-1.0, 1.0], n))
     passing = (side * pace)[:, None] * tangent
     curvature = np.where(plan == "passing", rng.uniform(0, bend, n), 0.0)
@@ -301,14 +300,14 @@ def _is_possible(
     )
     pace = np.linalg.norm(velocity, axis=-1)
     is_standing = plan == "standing"
-    is_respectful = plan != "intruder"
     is_fast_enough = (pace >= MIN_WALKING_SPEED) | is_standing[:, None]
     has_walking_speed = ((pace <= settings.max_speed) & is_fast_enough).all(axis=1)
     possible = is_in_view & (np.hypot(x, y) >= 1 + MARGIN) & has_walking_speed
+    is_checked = possible & (plan != "intruder")
     # checked last, because zones take longest
-    some = np.flatnonzero(possible & is_respectful)
+    some = np.flatnonzero(is_checked)
     possible[some] = _stays_outside(settings, position[some], speed[some, None])
-    some = np.flatnonzero(possible & is_respectful & ~is_standing)
+    some = np.flatnonzero(possible & is_checked & ~is_standing)
     course = np.arctan2(velocity[some, :, 1], velocity[some, :, 0])
     possible[some] = _stays_outside(
         settings, _rotate(-position[some], -course), pace[some]
@@ -348,7 +347,7 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     pair = pair[is_tracked]
     frames = frames[is_tracked]
     position, velocity = positions(staged.iloc[pair], frames)
-    measured = position + rng.normal(0, settings.noise, position.shape)
+    position += rng.normal(0, settings.noise, position.shape)
     sensor_velocity = velocity + rng.normal(0, _VELOCITY_NOISE, velocity.shape)
     facing = np.arctan2(velocity[..., 1], velocity[..., 0]) + rng.normal(
         0, _FACING_NOISE, velocity.shape[:2]
@@ -359,14 +358,14 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     short = settings.short_gaps
     long = settings.long_gaps
     kind = rng.choice(3, (n, 2), p=[short, long, 1 - short - long])
-    lengths = [rng.uniform(*gap, (n, 2)) for gap in (_SHORT_GAP, _LONG_GAP)]
+    lengths = [rng.uniform(*gap, (n, 2)) for gap in _GAPS]
     length = np.choose(kind, [*lengths, np.zeros((n, 2))])
     gap_start = start[:, None] + rng.uniform(0, settings.tracked - length)
     time = frames[:, None]
     is_recorded = ~((time > gap_start[pair]) & (time < (gap_start + length)[pair]))
     speed = np.linalg.norm(sensor_velocity, axis=-1)
-    metres = np.stack([*np.moveaxis(measured, -1, 0), height, speed])
-    millimetres = np.rint(1000 * metres).astype(np.int32)
+    metres = [*np.moveaxis(position, -1, 0), height, speed]
+    millimetres = np.rint(np.multiply(1000, metres)).astype(np.int32)
     columns = {
         "time": np.broadcast_to(time, is_recorded.shape),
         "id": FIRST_ID + ID_STEP * (2 * pair[:, None] + np.arange(2)),
