@@ -16,6 +16,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 import pandas as pd
@@ -226,6 +227,9 @@ def _end_kernels() -> None:
             words = " ".join(process.cmdline())
             if "ipykernel" in words or "multiprocessing.forkserver" in words:
                 process.kill()
+                # a server of forks that is still dying would be asked for the next kernel
+                while process.status() != psutil.STATUS_ZOMBIE:
+                    sleep(0.01)
 
 
 def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:

@@ -13,7 +13,7 @@ from helpers.track_tables import DAY, make_crowd, make_tracks, make_walk
 from plots import reference_frame
 
 import szlib
-from szlib.encounters import neighbours
+from szlib.encounters import occupants
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.geometry import AttentionalSpace, Square, wrap_angle
 from szlib.encounters.samples import SAMPLE_COLUMNS
@@ -243,7 +243,7 @@ def test_block_size_does_not_matter(
     crowd: pd.DataFrame, known: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for pairs in (40, 3001):
-        monkeypatch.setattr(neighbours, "_AT_ONCE", pairs)
+        monkeypatch.setattr(occupants, "_AT_ONCE", pairs)
         pd.testing.assert_frame_equal(find_encounters(crowd, square=ROOM), known)
 
 
