@@ -105,5 +105,5 @@ judges.check("speed_limit", speed_limit)
 # |---|---|
 # | 3 | three different reasons, such as few encounters in a direction, groups, walls, errors of tracking, culture or crowding |
 # | 3 | for each reason an observation in the data that would show it |
-# | 2 | bias is told from noise: which of the reasons more data would not mend |
+# | 2 | bias is distinguished from noise: which of the reasons more data would not mend |
 # | 2 | the choice of quantile and speed range of one's own method is discussed |
