@@ -15,8 +15,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
+from multiprocessing import active_children
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 import pandas as pd
@@ -222,14 +222,12 @@ def _execute_all(
 
 def _end_kernels() -> None:
     """End all kernels that still run, so that the threads that wait for them end, too."""
-    for process in psutil.Process().children(recursive=True):
+    for kernel in active_children():  # those that are forked
+        kernel.kill()
+    for process in psutil.Process().children():
         with suppress(psutil.Error):
-            words = " ".join(process.cmdline())
-            if "ipykernel" in words or "multiprocessing.forkserver" in words:
+            if "ipykernel_launcher" in process.cmdline():
                 process.kill()
-                # a server of forks that is still dying would be asked for the next kernel
-                while process.status() != psutil.STATUS_ZOMBIE:
-                    sleep(0.01)
 
 
 def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:

@@ -5,6 +5,7 @@ import os
 import re
 import sys
 
+import psutil
 import pytest
 
 from szlib.core.errors import DataError
@@ -346,6 +347,29 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
     monkeypatch.setattr(runner, "execute_notebook", interrupted)
     assert run() == 130
     assert "stopped" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="kernels are not forked")
+def test_a_stopped_run_leaves_the_server_of_kernels_to_the_next_run(
+    notebooks, monkeypatch
+):
+    servers = []
+
+    def interrupted(*arguments):
+        assert execution.execute_notebook(*arguments)["status"] == "done"
+        servers.extend(
+            process
+            for process in psutil.Process().children()
+            if "multiprocessing.forkserver" in process.cmdline()[-1]
+        )
+        raise KeyboardInterrupt
+
+    notebooks(_01_one="")
+    with monkeypatch.context() as patched:
+        patched.setattr(runner, "execute_notebook", interrupted)
+        assert run() == 130
+    assert [process.status() for process in servers] == [psutil.STATUS_SLEEPING]
+    assert run() == 0
 
 
 KILLS_ITS_KERNEL = """# %% tags=["parameters"]
