@@ -16,7 +16,7 @@ from contextlib import closing
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 from ipykernel.kernelspec import get_kernel_dict
 from jupyter_client.kernelspec import KernelSpec
@@ -178,12 +178,15 @@ class ForkingProvisioner(LocalProvisioner):
         given = cmd[3:], options["env"], options["cwd"]
         process = context.Process(target=_serve, args=given)
         process.start()
+        pid = cast(int, process.pid)
         streams = dict.fromkeys(("stdin", "stdout", "stderr"))
         self.process = SimpleNamespace(  # type: ignore[assignment]
             poll=lambda: process.exitcode, wait=process.join, kill=process.kill,
-            terminate=process.terminate, pid=process.pid, **streams,
+            terminate=process.terminate, pid=pid, **streams,
+            # used where the group of the process has gone, as of a kernel that has just died
+            send_signal=lambda number: os.kill(pid, number),
         )  # fmt: skip
-        self.pid = self.pgid = process.pid  # it leads a session of its own
+        self.pid = self.pgid = pid  # it leads a session of its own
         return self.connection_info
 
 

@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
-from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
@@ -221,12 +220,15 @@ def _execute_all(
 
 
 def _end_kernels() -> None:
-    """End all kernels that still run, so that the threads that wait for them end, too."""
-    for kernel in active_children():  # those that are forked
-        kernel.kill()
-    for process in psutil.Process().children():
+    """End all kernels that still run, so that the threads that wait for them end, too.
+
+    The server that forks them lives on: a dying one would be asked for the next kernel.
+    """
+    for process in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
-            if "ipykernel_launcher" in process.cmdline():
+            words = " ".join(process.cmdline())
+            is_forked = "multiprocessing.forkserver" in words
+            if (is_forked and process.ppid() != os.getpid()) or "-m ipykernel" in words:
                 process.kill()
 
 

@@ -388,5 +388,6 @@ def test_a_notebook_whose_kernel_is_ended_leaves_no_unfinished_copy(tmp_path):
     folder.mkdir()
     given = {"file": str(tmp_path / "begun")}
     outcome = execution.execute_notebook(script, given, folder, {})
-    assert outcome["status"] == "refused" and "DeadKernelError" in outcome["error"]
+    assert "DeadKernelError" in outcome["error"]
+    assert outcome["status"] == "refused"
     assert not (folder / "01_one.ipynb").exists()
