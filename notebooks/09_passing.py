@@ -265,9 +265,11 @@ Markdown(
 for name, scene in (("from the front", scenario), ("from behind", scenario.turn_people())):
     distance, h = find_avoidance_start(drive(scene, zone, settings))
     print(f"{name}: avoidance starts {distance:.2f} m from the person, at h = {h:.2f} m")
+ahead, behind = zone.curve()[:, 0].max(), -zone.curve()[:, 0].min()
+print(f"the zone reaches {ahead:.2f} m ahead and {behind:.2f} m behind: {100 * (ahead - behind):+.0f} cm")
 
 # %% [markdown]
-# The zone reaches only a few centimetres farther ahead than behind. A person would hardly notice the difference.
+# A person hardly notices a difference of a few centimetres.
 
 # %% [markdown]
 # ## Where gamma = 0.05 comes from

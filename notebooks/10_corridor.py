@@ -88,8 +88,8 @@ scenario_runs.list_parameters(
 # ## The paper's chain, and ours
 #
 # As in chapter 09, orange is the paper's chain, its zone and its controller; gamma and a_max are ours, since the paper
-# gives none. Blue is our zone (chapter 05) and our controller. They pass on different sides: in the paper's chain
-# the tilt of the zone chooses the side, in ours the rule of the side (chapter 09). Both slow down.
+# gives none. Blue is our zone (chapter 05) and our controller. In the paper's chain the tilt of the zone chooses the
+# side, in ours the rule of the side (chapter 09).
 
 # %%
 scenario_runs.tabulate_five(runs.by_name())
@@ -133,15 +133,21 @@ scenario_runs.record_both_claims(record, runs)
 
 
 # %%
-def free_room(width, zone_sideways=0.75, robot=0.5, margin=0.05):
+reach = zone.curve()[:, 1].max()  # of the zone, to the side on which the robot passes
+
+
+def free_room(width, zone_sideways=reach, robot=0.5, margin=0.05):
     return width / 2 - zone_sideways - 2 * (robot + margin)
 
 
-room = free_room(4.6)
-print(f"{100 * room:.0f} cm; in the middle of it h is {100 * room / 2:.0f} cm to the zone and to the wall")
+room, least_width = free_room(width), 2 * (reach + 1.1)
+print(
+    f"the zone reaches {reach:.2f} m to the side: {100 * room:.0f} cm are free, and {50 * room:.0f} cm on each side of the robot"
+)
+print(f"both fit side by side in a corridor wider than 2 x ({reach:.2f} m + 1.1 m) = {least_width:.1f} m")
 
 # %% [markdown]
-# So it can pass, with little room. How slow it becomes there depends on which row limits it.
+# A robot that fits has little room. How slow it becomes there depends on which row limits it.
 #
 # ## Person or wall?
 #
@@ -238,9 +244,9 @@ Markdown(
 # %% [markdown]
 # ## How wide must a corridor be?
 #
-# Both fit side by side if the room that is left is positive, that is, if the corridor is wider than
-# 2 x (0.75 m + 1.1 m) = 3.7 m. **What do you think?** Does the robot pass in a corridor of 3.8 m? From which width on
-# does it no longer notice the walls?
+# Both fit side by side if the room that is left is positive ("A number first" gives the width). **What do you think?**
+# Does the robot pass in the narrowest corridor in which both fit? From which width on does it no longer notice the
+# walls?
 
 # %%
 widths, meetings = (3.4, 3.8, 4.2, 4.6, 5.0, 5.6, 6.4, 8.0), {}
@@ -266,7 +272,14 @@ for ax, key, name in (
     ax.axvline(width, color=figures.GREY, linestyle=":")
     ax.set(xlabel="width of the corridor [m]", ylabel=name, ylim=(0, None))
 left.set_title("The wider, the faster")
-right.set_title("Going back costs more time than squeezing by")
+times = {
+    is_back: [
+        each["time_to_goal"] for at, each in found.items() if (strategies[at] == "backs out") == is_back
+    ]
+    for is_back in (True, False)
+}
+costs = times[True] and times[False] and min(times[True]) > max(times[False])
+right.set_title("Going back costs more time than squeezing by" if costs else "The time that each width costs")
 left.legend(loc="lower right")
 record.figure(fig, "widths")
 
@@ -274,11 +287,13 @@ record.figure(fig, "widths")
 # The answer
 narrow = [each for each in widths if strategies[each] == "backs out"]
 text = "none of these corridors" if not narrow else f"corridors up to {max(narrow):g} m wide"
-fits = f"At 3.8 m both would fit, with {100 * free_room(3.8):.0f} cm of room: " * (3.8 in narrow)
-fits += (
-    "with so little h the robot may hardly move, and the person is there before it has squeezed by. "
-    * bool(fits)
-)
+roomy = [each for each in narrow if each > least_width]
+fits = ""
+if roomy:
+    fits = (
+        f"At {roomy[0]:g} m both would fit, with {100 * free_room(roomy[0]):.0f} cm of room: with so little h the robot may "
+        "hardly move, and the person is there before it has squeezed by. "
+    )
 Markdown(
     f"<details><summary>Answer</summary>\n\nIn {text} the robot goes back and lets the person through. {fits}In the widest corridor it goes {found[8.0]['min_speed']:.2f} m/s at the slowest, as beside a person in the "
     f"open ({slowest['person alone']:.2f} m/s).\n\n</details>"
@@ -322,7 +337,7 @@ Markdown(
     + "; ".join(f"{what}: {f'{time:.1f} s' if time else 'not within 30 s'}" for what, time in times)
     + "."
     + " In the narrowest one it goes back and lets the person out first, although both would fit."
-    * (3.8 in narrow)
+    * (3.8 in roomy)
     + "\n\n</details>"
 )
 
