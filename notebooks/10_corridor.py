@@ -272,13 +272,11 @@ for ax, key, name in (
     ax.axvline(width, color=figures.GREY, linestyle=":")
     ax.set(xlabel="width of the corridor [m]", ylabel=name, ylim=(0, None))
 left.set_title("The wider, the faster")
-times = {
-    is_back: [
-        each["time_to_goal"] for at, each in found.items() if (strategies[at] == "backs out") == is_back
-    ]
+backs, passes = (
+    [each["time_to_goal"] for at, each in found.items() if (strategies[at] == "backs out") == is_back]
     for is_back in (True, False)
-}
-costs = times[True] and times[False] and min(times[True]) > max(times[False])
+)
+costs = min(backs, default=0) > max(passes, default=np.inf)
 right.set_title("Going back costs more time than squeezing by" if costs else "The time that each width costs")
 left.legend(loc="lower right")
 record.figure(fig, "widths")

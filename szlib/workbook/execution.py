@@ -12,7 +12,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping
-from contextlib import closing
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -141,12 +140,14 @@ def run_cells(
     )
     own = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1"}
     failure = None
+    loop = ensure_event_loop()  # that of this thread, which Jupyter leaves open
     try:
-        # the loop of this thread, which Jupyter leaves open
-        with closing(ensure_event_loop()):
-            client.execute(env={**os.environ, **own, **environment})
+        client.execute(env={**os.environ, **own, **environment})
     except CellExecutionError as error:
         failure = error
+    finally:
+        if not loop.is_running():  # one that runs belongs to the caller
+            loop.close()
     write_file(folder / f"{script.stem}.ipynb", nbformat.writes(notebook))
     if failure:
         raise failure

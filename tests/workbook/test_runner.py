@@ -1,5 +1,6 @@
 """`szlib run`: the notebooks that it executes, its output, and its exit codes."""
 
+import asyncio
 import json
 import os
 import re
@@ -391,3 +392,14 @@ def test_a_notebook_whose_kernel_is_ended_leaves_no_unfinished_copy(tmp_path):
     assert "DeadKernelError" in outcome["error"]
     assert outcome["status"] == "refused"
     assert not (folder / "01_one.ipynb").exists()
+
+
+def test_a_notebook_is_executed_where_an_event_loop_runs(tmp_path):
+    async def execute():
+        return execution.execute_notebook(script, {}, tmp_path, {})
+
+    script = tmp_path / "01_one.py"
+    script.write_text("# %%\n1 + 1\n")
+    outcome = asyncio.run(execute())
+    assert "wrote no record" in outcome["error"]
+    assert (tmp_path / "01_one.ipynb").exists()
