@@ -147,7 +147,7 @@ print(
 print(f"both fit side by side in a corridor wider than 2 x ({reach:.2f} m + 1.1 m) = {least_width:.1f} m")
 
 # %% [markdown]
-# A robot that fits has little room. How slow it becomes there depends on which row limits it.
+# How slow a robot that fits becomes there depends on which row limits it.
 #
 # ## Person or wall?
 #

@@ -362,7 +362,8 @@ def test_a_stopped_run_leaves_the_server_of_kernels_to_the_next_run(
         servers.extend(
             process
             for process in psutil.Process().children()
-            if "multiprocessing.forkserver" in process.cmdline()[-1]
+            if process.status() != psutil.STATUS_ZOMBIE
+            and "multiprocessing.forkserver" in " ".join(process.cmdline())
         )
         raise KeyboardInterrupt
 
@@ -370,7 +371,7 @@ def test_a_stopped_run_leaves_the_server_of_kernels_to_the_next_run(
     with monkeypatch.context() as patched:
         patched.setattr(runner, "execute_notebook", interrupted)
         assert run() == 130
-    assert [process.status() for process in servers] == [psutil.STATUS_SLEEPING]
+    assert len(servers) == 1 and servers[0].status() != psutil.STATUS_ZOMBIE
     assert run() == 0
 
 
