@@ -329,10 +329,9 @@ recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer
-times = ((f"{row['width']:g} m, {row['pace']:g} m/s", row["time"]) for row in recording.table)
 Markdown(
-    "<details><summary>Answer</summary>\n\nThe narrower the corridor, the later it arrives: "
-    + "; ".join(f"{what}: {f'{time:.1f} s' if time else 'not within 30 s'}" for what, time in times)
+    "<details><summary>Answer</summary>\n\nThe times to the goal, the latest first: "
+    + scenario_runs.list_arrivals(recording.table)
     + "."
     + " In the narrowest one it goes back and lets the person out first, although both would fit."
     * (3.8 in roomy)

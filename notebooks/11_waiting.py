@@ -417,10 +417,9 @@ recording.open_live()
 
 # %% jupyter={"source_hidden": true}
 # The answer
-times = ((f"{row['width']:g} m, {row['pace']:g} m/s", row["time"]) for row in recording.table)
 Markdown(
-    "<details><summary>Answer</summary>\n\nIt arrives later, the slower the person and the narrower the passage: "
-    + "; ".join(f"{what}: {f'{time:.1f} s' if time else 'not within 30 s'}" for what, time in times)
+    "<details><summary>Answer</summary>\n\nThe times to the goal, the latest first: "
+    + scenario_runs.list_arrivals(recording.table)
     + ". It goes on when the person is out.\n\n</details>"
 )
 

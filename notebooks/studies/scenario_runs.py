@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -153,3 +155,13 @@ def find_holding_times(run: Run) -> dict[str, np.ndarray]:
     holds = run.residual.min(axis=2) <= ACTIVE_RESIDUAL
     rows = ("person", "wall to its left", "wall to its right")
     return {name: run.time[row] for name, row in zip(rows, holds.T, strict=True)}
+
+
+def list_arrivals(table: Sequence[Mapping[str, Any]]) -> str:
+    """The runs of a recording of widths and paces, with their times to the goal, the latest first."""
+    rows = sorted(table, key=lambda row: row["time"] or math.inf, reverse=True)
+    return "; ".join(
+        f"{row['width']:g} m and {row['pace']:g} m/s: "
+        + (f"{row['time']:.1f} s" if row["time"] else "not within 30 s")
+        for row in rows
+    )

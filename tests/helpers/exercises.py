@@ -50,7 +50,7 @@ def solution(name: str) -> Any:
 def judge(
     name: str, answer: Callable[..., Any] | str, seeds: Iterable[int]
 ) -> Iterator[Verdict]:
-    """The verdicts on an answer, a function or the source of one, in one process."""
+    """The verdicts on an answer, a function or the source of one, for each seed in a new process."""
     task = TASKS[name][2]
     try:
         packed = (
@@ -62,7 +62,6 @@ def judge(
         for _ in seeds:
             yield Verdict(name, False, str(refusal))
         return
-    with Answer(packed, task.allowed, task.seconds) as process:
-        for seed in seeds:
-            process.renew()
+    for seed in seeds:
+        with Answer(packed, task.allowed, task.seconds) as process:
             yield task.check(process, seed)

@@ -95,3 +95,14 @@ def test_a_lesson_takes_the_plazas_zone_where_its_scenes_have_no_room(
     assert ("they take the plaza's zone" in said) != is_kept
     if not is_kept:
         assert chosen == szlib.PlazaSettings().true_zone(1.1)
+
+
+def test_arrivals_are_listed_latest_first_and_a_robot_that_does_not_arrive_before_all():
+    table = [
+        {"width": 5.0, "pace": 0.3, "time": 12.0},
+        {"width": 4.4, "pace": 0.7, "time": 16.04},
+        {"width": 3.8, "pace": 0.3, "time": None},
+    ]
+    assert scenario_runs.list_arrivals(table) == (
+        "3.8 m and 0.3 m/s: not within 30 s; 4.4 m and 0.7 m/s: 16.0 s; 5 m and 0.3 m/s: 12.0 s"
+    )

@@ -75,13 +75,13 @@ class Answer:
     ----------
     packed : from `pack`, or {"source": text, "name": name of the function}.
     modules : modules of szlib that the answer may use.
-    seconds : time for all calls together [s].
+    seconds : time for all calls together [s]; the judge's own work between them does not count.
     """
 
     def __init__(self, packed: dict[str, str], modules: tuple[str, ...], seconds: float) -> None:
         self._modules, self._seconds = modules, seconds
         self._mark, self._packed = secrets.token_hex(8), packed
-        self._deadline = monotonic() + seconds
+        self._left = seconds  # for the calls to come [s]
         self._program: Process | None = None
         self._last_line, self._has_ended = f"end {self._mark}\n".encode(), False
 
@@ -94,17 +94,16 @@ class Answer:
                 program.end()
                 raise RuntimeError(f"{_PROGRAM} does not start; run it by hand to see why")
         self._program = program
-        self._deadline = monotonic() + self._seconds
-        self._send({"mark": self._mark, "seconds": self._seconds, **self._packed})
+        first = {"mark": self._mark, "seconds": self._seconds, **self._packed}
+        self._send(first, monotonic() + self._seconds)
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._program is None:
             return
         late = monotonic() + 2.0
-        self._deadline = late
         if not self._has_ended:
-            self._send(None)
+            self._send(None, late)
         while not self._has_ended and (line := self._program.receive(late)):
             self._has_ended = line == self._last_line
         if self._has_ended and hasattr(os, "fork"):
@@ -113,14 +112,10 @@ class Answer:
             self._program.end()
         self._program = None
 
-    def renew(self) -> None:
-        """Give the answer its whole time again, for another check."""
-        self._deadline = monotonic() + self._seconds
-
-    def _send(self, value: Any) -> None:
+    def _send(self, value: Any, deadline: float) -> None:
         data = pickle.dumps(value)
         if self._program is not None:
-            self._program.send(struct.pack(">Q", len(data)) + data, self._deadline + 1.0)
+            self._program.send(struct.pack(">Q", len(data)) + data, deadline + 1.0)
 
     def __call__(self, *arguments: Any) -> Any:
         """The result of the function for these arguments."""
@@ -128,9 +123,16 @@ class Answer:
             raise RuntimeError("an Answer is used in a `with` statement")
         if self._has_ended:
             raise Refusal("your function ended its process")
-        self._send(arguments)
+        start = monotonic()
+        try:
+            return self._ask(self._program, arguments, start + self._left)
+        finally:
+            self._left -= monotonic() - start
+
+    def _ask(self, program: Process, arguments: tuple[Any, ...], deadline: float) -> Any:
+        self._send(arguments, deadline)
         while True:
-            line = self._program.receive(self._deadline)
+            line = program.receive(deadline)
             if line is None:
                 raise Refusal(f"your function is too slow: the check ends after {self._seconds:g} s")
             self._has_ended = line == self._last_line

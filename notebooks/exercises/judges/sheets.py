@@ -32,11 +32,10 @@ SHEETS: dict[str, tuple[Task, ...]] = {
 
 
 def judge(name: str, packed: dict[str, str], seeds: Iterable[int]) -> Iterator[Verdict]:
-    """Judge a packed answer in the cases of each seed, all in one process of the answer."""
+    """Judge a packed answer in the cases of each seed, for each in a new process of the answer."""
     task = find_task(name)
-    with Answer(packed, task.allowed, task.seconds) as answer:
-        for seed in seeds:
-            answer.renew()
+    for seed in seeds:
+        with Answer(packed, task.allowed, task.seconds) as answer:
             yield task.check(answer, seed)
 
 
