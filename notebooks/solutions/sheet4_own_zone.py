@@ -53,19 +53,29 @@ def my_zone(samples, speed):
     """The zone at this speed [m/s], a szlib.Ellipse in the person's frame."""
     ### BEGIN SOLUTION
     close = samples[(samples["distance"] <= 2) & samples["speed"].between(speed - 0.2, speed + 0.2)]
-    edge = []
-    for theta in np.radians(np.arange(-180, 180, 10)):
-        off = np.angle(np.exp(1j * (close["los_angle"] - theta)))
-        approach = close[np.abs(off) < np.radians(12)].groupby("encounter")["distance"].min()
-        edge.append(np.quantile(approach, 0.07) * np.array([np.cos(theta), np.sin(theta)]))
-    x, y = np.transpose(edge)
-    terms = np.column_stack([x * x, x * y, y * y, x, y])
-    p, q, r, s, t = np.linalg.lstsq(terms, np.ones(len(x)))[0]
-    form = np.array([[p, q / 2], [q / 2, r]])
-    center = -np.linalg.solve(form, [s, t]) / 2
-    values, vectors = np.linalg.eigh(form / (1 + center @ form @ center))
-    a, b = 1 / np.sqrt(values)
-    return szlib.Ellipse(center, (a, b), np.arctan2(vectors[1, 0], vectors[0, 0]))
+    zone = szlib.Ellipse((0, 0), (1, 1))
+
+    def reach(theta):  # of the zone found last, in the direction theta [m]
+        curve = zone.curve()
+        return np.interp(theta, np.arctan2(curve[:, 1], curve[:, 0]), np.hypot(*curve.T), period=2 * np.pi)
+
+    for _ in range(3):  # a long zone changes within a sector, so distances are shares of its reach
+        shares = close.assign(share=close["distance"] / reach(close["los_angle"]))
+        edge = []
+        for theta in np.radians(np.arange(-180, 180, 10)):
+            off = np.angle(np.exp(1j * (close["los_angle"] - theta)))
+            nearest = shares[np.abs(off) < np.radians(18)].groupby("encounter")["share"].min()
+            at = np.quantile(nearest, 0.07) * reach(theta)
+            edge.append(at * np.array([np.cos(theta), np.sin(theta)]))
+        x, y = np.transpose(edge)
+        terms = np.column_stack([x * x, x * y, y * y, x, y])
+        p, q, r, s, t = np.linalg.lstsq(terms, np.ones(len(x)))[0]
+        form = np.array([[p, q / 2], [q / 2, r]])
+        center = -np.linalg.solve(form, [s, t]) / 2
+        values, vectors = np.linalg.eigh(form / (1 + center @ form @ center))
+        a, b = 1 / np.sqrt(values)
+        zone = szlib.Ellipse(center, (a, b), np.arctan2(vectors[1, 0], vectors[0, 0]))
+    return zone
     ### END SOLUTION
 
 
