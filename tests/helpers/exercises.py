@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import jupytext
-from judges.answers import Answer, Refusal, pack
+from judges import sheets
+from judges.answers import Refusal, pack
 from judges.client import Verdict
-from judges.sheets import SHEETS
 from judges.task import Task
 
 from szlib.workbook import folders
@@ -19,7 +19,7 @@ from szlib.workbook import folders
 EXERCISES, SOLUTIONS = folders.NOTEBOOKS / "exercises", folders.NOTEBOOKS / "solutions"
 TASKS: dict[str, tuple[str, int, Task]] = {
     task.name: (sheet, number, task)
-    for sheet, tasks in SHEETS.items()
+    for sheet, tasks in sheets.SHEETS.items()
     for number, task in enumerate(tasks)
 }
 """Sheet, place in the sheet, and task, by name of the task."""
@@ -51,7 +51,6 @@ def judge(
     name: str, answer: Callable[..., Any] | str, seeds: Iterable[int]
 ) -> Iterator[Verdict]:
     """The verdicts on an answer, a function or the source of one, for each seed in a new process."""
-    task = TASKS[name][2]
     try:
         packed = (
             {"source": answer, "name": name}
@@ -63,5 +62,4 @@ def judge(
             yield Verdict(name, False, str(refusal))
         return
     for seed in seeds:
-        with Answer(packed, task.allowed, task.seconds) as process:
-            yield task.check(process, seed)
+        yield sheets.judge(name, packed, seed)

@@ -175,6 +175,26 @@ def test_a_wrong_answer_is_described(answer, message):
     assert re.search(message, verdict.message), verdict.message
 
 
+def test_each_check_has_a_process_of_its_own():
+    """What an answer keeps, or the time that it took, does not reach the next check."""
+    source = "seen = []\ndef speed_limit(h, gamma, dt, v):\n    seen.append(h)\n    return len(seen)"
+    first, again = (str(verdict) for verdict in judge("speed_limit", source, [1, 1]))
+    assert first == again
+
+
+def test_the_time_of_the_judge_is_not_charged_to_the_answer():
+    def cases(rng):
+        for x in (3.0, 4.0, 5.0):
+            time.sleep(0.8)
+            yield (x,)
+
+    with Answer(pack(lambda x: 2 * x), (), 2.0) as process:
+        assert replace(make_task(), cases=cases).check(process, 0).passed
+    with Answer(pack(lambda x: time.sleep(0.9) or 2 * x), (), 2.0) as process:
+        verdict = replace(make_task(), cases=lambda _: [(3.0,)] * 3).check(process, 0)
+    assert "too slow: the check ends after 2 s" in verdict.message
+
+
 def test_a_failing_case_can_be_run_again():
     def wrong(points, a, b):
         return np.abs(szlib_free_line(points, a, b))
@@ -255,10 +275,10 @@ def test_no_cheat_passes_and_none_holds_the_judge(kind, monkeypatch):
     """`tests/studies/exercises.py --cheats` does the same in 300 checks of each."""
     assert len(CHEATS[kind]) == 12
     for name, source in CHEATS[kind]:
-        sheet, number, task = TASKS[name]
+        task = judges.sheets.TASKS[name]
         slow = name in LONG or kind not in ("concurrency", "exhaustion")
         limited = replace(task, seconds=task.seconds if slow else 1.0)
-        monkeypatch.setitem(TASKS, name, (sheet, number, limited))
+        monkeypatch.setitem(judges.sheets.TASKS, name, limited)
         start = time.monotonic()
         (verdict,) = judge(name, source, [SEED])
         assert not verdict.passed, source

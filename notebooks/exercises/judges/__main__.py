@@ -46,7 +46,7 @@ def mark_sheet(file: Path, seed: int) -> list[dict[str, object]]:
     for sheet, tasks in SHEETS.items():
         for task in tasks:
             if re.search(rf"^def {task.name}\(", source, re.MULTILINE):
-                (verdict,) = judge(task.name, {"source": source, "name": task.name}, [seed])
+                verdict = judge(task.name, {"source": source, "name": task.name}, seed)
                 points = task.minutes if verdict.passed else 0
                 message = " ".join(verdict.message.split())
                 row = {
@@ -67,7 +67,7 @@ def serve() -> None:
     for line in sys.stdin:
         question = json.loads(line)
         try:
-            (verdict,) = judge(question["name"], question["answer"], [int(question["seed"])])
+            verdict = judge(question["name"], question["answer"], int(question["seed"]))
             reply = {"passed": verdict.passed, "message": verdict.message}
         except SzlibError as error:
             reply = {"error": str(error)}

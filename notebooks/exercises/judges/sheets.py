@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -31,12 +31,11 @@ SHEETS: dict[str, tuple[Task, ...]] = {
 """The tasks of each sheet, in order. A sheet belongs to one week, so that it can be handed out whole."""
 
 
-def judge(name: str, packed: dict[str, str], seeds: Iterable[int]) -> Iterator[Verdict]:
-    """Judge a packed answer in the cases of each seed, for each in a new process of the answer."""
+def judge(name: str, packed: dict[str, str], seed: int) -> Verdict:
+    """Judge a packed answer in the cases of one seed, in a process of its own."""
     task = find_task(name)
-    for seed in seeds:
-        with Answer(packed, task.allowed, task.seconds) as answer:
-            yield task.check(answer, seed)
+    with Answer(packed, task.allowed, task.seconds) as answer:
+        return task.check(answer, seed)
 
 
 def case(name: str, seed: int, number: int) -> Args:
