@@ -21,8 +21,8 @@ from ..core.checks import Array
 Cost = Callable[[Array], tuple[float, Array]]
 
 R_HAT, EFFECTIVE = 1.01, 400
-_CHAINS, _BLOCK, _MOST_BLOCKS = 4, 60, 16
-_ADAPTING = 3  # blocks before the first draw; the last one adapts the step only
+_CHAINS, _BLOCK, _MOST_BLOCKS = 4, 60, 24
+_ADAPTING = 4  # blocks before the first draw; the last one adapts the step only
 _STEPS = (3, 10)  # of the leapfrog, least and less than
 _ACCEPTED, _RATE = (
     0.8,
