@@ -59,13 +59,16 @@ def my_zone(samples, speed):
         curve = zone.curve()
         return np.interp(theta, np.arctan2(curve[:, 1], curve[:, 0]), np.hypot(*curve.T), period=2 * np.pi)
 
-    for _ in range(3):  # a long zone changes within a sector, so distances are shares of its reach
-        shares = close.assign(share=close["distance"] / reach(close["los_angle"]))
+    for quantile in (0.07, 0.015, 0.015):
+        # A long zone changes within a sector, so distances are shares of its reach.
+        close = close.assign(share=close["distance"] / reach(close["los_angle"]))
+        if quantile < 0.07:  # from the second round on: people who came far into the zone are left out
+            close = close[close.groupby("encounter")["share"].transform("min") > 0.75]
         edge = []
         for theta in np.radians(np.arange(-180, 180, 10)):
             off = np.angle(np.exp(1j * (close["los_angle"] - theta)))
-            nearest = shares[np.abs(off) < np.radians(18)].groupby("encounter")["share"].min()
-            at = np.quantile(nearest, 0.07) * reach(theta)
+            nearest = close[np.abs(off) < np.radians(18)].groupby("encounter")["share"].min()
+            at = np.quantile(nearest, quantile) * reach(theta)
             edge.append(at * np.array([np.cos(theta), np.sin(theta)]))
         x, y = np.transpose(edge)
         terms = np.column_stack([x * x, x * y, y * y, x, y])
