@@ -41,7 +41,7 @@ _STOPPED = "stopped; finished results stay in their folder"
 # Errors of standard output or standard error that is full or closed.
 _BROKEN_STREAM = (OSError, ValueError)
 # Numbers of errors of writing; those of files, not of streams, have a file name.
-_UNWRITABLE = (errno.EBADF, errno.EFBIG, errno.EIO, errno.ENOSPC, errno.EPIPE)
+_UNWRITABLE = (errno.EBADF, errno.EFBIG, errno.EIO, errno.ENOSPC)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,6 +65,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         _print_error(_STOPPED)
         return int(stop.args[0]) if stop.args else 130
+    except BrokenPipeError:  # the reader of standard output has ended, such as `head`
+        _drop_output()
+        return 128 + signal.SIGPIPE
     except Exception as error:
         if os.environ.get("SZLIB_TRACEBACK"):
             traceback.print_exc()
@@ -375,6 +378,12 @@ def _describe(error: Exception) -> str:
     return str(error) if is_expected else f"{type(error).__name__}: {error}"
 
 
+def _drop_output() -> None:
+    """Send the rest of standard output nowhere."""
+    with suppress(*_BROKEN_STREAM):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _print_error(text: str) -> None:
     """Print one line on standard error, and drop the rest of a standard output that cannot be written."""
     with suppress(*_BROKEN_STREAM):
@@ -384,5 +393,4 @@ def _print_error(text: str) -> None:
     try:
         sys.stdout.flush()
     except _BROKEN_STREAM:
-        with suppress(*_BROKEN_STREAM):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()

@@ -320,6 +320,16 @@ def test_full_or_ascii_standard_output_gives_one_line(tmp_path, monkeypatch):
     assert rb"pl\xe4tze" in printed.getvalue()
 
 
+def test_a_reader_that_ends_early_ends_the_command_in_silence(tmp_path):
+    make_plaza(tmp_path / "p.csv", settings=PlazaSettings(n_encounters=3))
+    there, here = os.pipe()
+    os.close(there)
+    done = command("inspect", str(tmp_path / "p.csv"), stdout=here)
+    os.close(here)
+    assert done.communicate()[1] == ""
+    assert done.returncode == 128 + signal.SIGPIPE
+
+
 def test_sigterm_stops_extract_with_exit_code_143(tmp_path):
     days = [make_plaza(tmp_path / f"d{k}.csv", settings=PlazaSettings(n_encounters=300, date=f"2000-01-0{k}"))
             for k in range(1, 10)]  # fmt: skip
