@@ -151,14 +151,8 @@ class PlazaSettings:
                 f"got {given:.1f} m; use a larger area or slower walkers"
             )
         self.compute_start_time()
-        reach = ellipse_reach(
-            np.array(
-                [
-                    (*zone.center, *zone.semi_axes, zone.angle)
-                    for zone in map(self.true_zone, np.linspace(low, high, 3))
-                ]
-            )
-        )
+        zones = self.interpolate_zones(np.linspace(low, high, 3))
+        reach = ellipse_reach(np.column_stack(zones))
         if not (reach < R_MAX).all():  # NaN where a zone does not contain the person
             raise ZoneError(
                 f"{self.slow_zone}, {self.fast_zone}: at {self.speeds} m/s the zone must "
