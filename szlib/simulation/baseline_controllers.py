@@ -120,8 +120,7 @@ class StraightController(BaselineController):
     ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
         s = self.settings
-        position = state[:2]
-        velocity = state[2:]
+        position, velocity = np.split(state, 2)
         ahead = self.velocity_to_goal(goal - position)
         reach = (
             float(velocity @ velocity) / (2 * s.a_max) + s.v_max * s.dt + self.margin
@@ -154,8 +153,7 @@ class SocialForceController(BaselineController):
         self, state: Array, goal: Array, people: Sequence[Person]
     ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
-        position = state[:2]
-        velocity = state[2:]
+        position, velocity = np.split(state, 2)
         force = (self.velocity_to_goal(goal - position) - velocity) / self.tau
         for person in people:
             force = force + self._push(position, velocity, person)
@@ -210,8 +208,7 @@ class DynamicWindowController(BaselineController):
     ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
         s = self.settings
-        position = state[:2]
-        velocity = state[2:]
+        position, velocity = np.split(state, 2)
         change = np.linspace(-1, 1, self.samples) * s.a_max * s.dt
         window = velocity + np.stack(np.meshgrid(change, change), axis=-1).reshape(
             -1, 2

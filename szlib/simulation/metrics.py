@@ -111,8 +111,7 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "_walls": slice(n_people, None),
     }
     speed = run.speed[way]
-    time = dt * np.arange(len(speed))
-    jerk = np.diff(np.diff(run.states[way, 2:], axis=0), axis=0) / dt**2
+    jerk = np.diff(run.states[way, 2:], n=2, axis=0) / dt**2
     cruising = (
         np.arange(len(speed))
         <= np.flatnonzero(speed >= CRUISE_FRACTION * speed.max())[-1]
@@ -121,7 +120,17 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     has_residuals = run.residual.shape[2] > 0 or not n_people
     violated = (nanmin(run.h, axis=1) < -TOLERANCE)[1:]
     overlap = (nanmin(run.clearance, axis=1) < -TOLERANCE)[1:]
-    solve_times = np.quantile(run.solve_time, list(SOLVE_TIMES.values())).tolist()
+    safe = run.safe[applied]
+    counted = {
+        "violations": violated,
+        "overlaps": overlap,
+        "infeasible_steps": run.slack[applied] > TOLERANCE,
+        "claimed_safe_steps": safe,
+        "flagged_steps": run.flagged[applied],
+        "unflagged_violations": safe & violated,
+        "unflagged_overlaps": safe & overlap,
+        **{f"steps_{name}": run.status[applied] == name for name in STATUSES},
+    }
     return {
         "success": run.success,
         "outcome": classify_outcome(run),
@@ -133,7 +142,7 @@ def compute_metrics(run: Run) -> dict[str, Any]:
             for of, part in parts.items()
         },
         "min_speed": float(
-            speed[(time >= START_UP_TIME) & cruising].min(initial=speed.max())
+            speed[(run.time[way] >= START_UP_TIME) & cruising].min(initial=speed.max())
         ),
         "mean_speed": float(speed.mean()),
         "max_speed": float(speed.max()),
@@ -145,19 +154,12 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "jerk": float((jerk**2).sum(axis=1).mean()) if len(jerk) else 0.0,
         "people": n_people,
         "walls": len(run.scenario.fixed),
-        "violations": int(violated.sum()),
-        "overlaps": int(overlap.sum()),
-        "infeasible_steps": int((run.slack[applied] > TOLERANCE).sum()),
-        "claimed_safe_steps": int(run.safe[applied].sum()),
-        "flagged_steps": int(run.flagged[applied].sum()),
-        "unflagged_violations": int((run.safe[applied] & violated).sum()),
-        "unflagged_overlaps": int((run.safe[applied] & overlap).sum()),
-        **{
-            f"steps_{name}": int((run.status[applied] == name).sum())
-            for name in STATUSES
-        },
+        **{name: int(steps.sum()) for name, steps in counted.items()},
         "max_slack": float(run.slack[applied].max(initial=0.0)),
-        **dict(zip(SOLVE_TIMES, solve_times, strict=True)),
+        **{
+            name: float(np.quantile(run.solve_time, share))
+            for name, share in SOLVE_TIMES.items()
+        },
     }
 
 
@@ -231,7 +233,7 @@ def find_avoidance_start(
     (distance, h) [m], interpolated between two states; NaN if the robot stays on the line.
     """
     start = run.scenario.start[:2]
-    course = run.scenario.goal - run.scenario.start[:2]
+    course = run.scenario.goal - start
     beside = run.states[:, :2] - start
     beside = np.abs(beside[:, 0] * course[1] - beside[:, 1] * course[0]) / np.hypot(
         *course
@@ -242,7 +244,7 @@ def find_avoidance_start(
     first = int(rows[0])
     last = max(first - 1, 0)
     share = 1.0
-    if first > last:
+    if first:
         share = (deviation - beside[last]) / (beside[first] - beside[last])
     values = np.stack([*locate_along_course(run, person), run.h[:, person]])
     x, y, h = values[:, last] + share * (values[:, first] - values[:, last])
@@ -279,12 +281,10 @@ def _classify_violation(run: Run, k: int) -> Outcome:
     i = int(np.nanargmin(run.h[k]))
     if i >= len(run.zones):
         return "hit wall"
-    before = max(k - 1, 0)
-    direction = run.states[before, :2] - run.people[before, i, :2]
-    direction = direction / np.hypot(*direction)
-    approach_of_person = (run.people[k, i, :2] - run.people[before, i, :2]) @ direction
-    approach_of_robot = -(run.states[k, :2] - run.states[before, :2]) @ direction
-    if approach_of_robot > approach_of_person:
+    states = [max(k - 1, 0), k]
+    robot, person = run.states[states, :2], run.people[states, i, :2]
+    to_robot = robot[0] - person[0]
+    if -np.diff(robot, axis=0)[0] @ to_robot > np.diff(person, axis=0)[0] @ to_robot:
         return "drove in"
     return "squeezed" if (run.h[k] < CROWDED_H).sum() > 1 else "run into"
 
@@ -350,10 +350,8 @@ def compute_retreat(run: Run) -> float:
 
     It is measured from the farthest point that the robot has reached so far.
     """
-    course = run.scenario.goal - run.scenario.start[:2]
-    along = (
-        (run.states[:, :2] - run.scenario.start[:2])
-        @ course
-        / max(float(np.hypot(*course)), 1e-12)
-    )
+    start = run.scenario.start[:2]
+    course = run.scenario.goal - start
+    length = max(float(np.hypot(*course)), 1e-12)
+    along = (run.states[:, :2] - start) @ course / length
     return float((np.maximum.accumulate(along) - along).max())

@@ -101,14 +101,9 @@ class Scenario:
             object.__setattr__(self, name, array)
         object.__setattr__(self, "people", tuple(self.people))
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
-        is_positive = 0 < self.duration < np.inf
-        require(
-            is_positive,
-            "duration",
-            self.duration,
-            "a positive number of seconds",
-            SolverError,
-        )
+        value = self.duration
+        expected = "a positive number of seconds"
+        require(0 < value < np.inf, "duration", value, expected, SolverError)
 
     @property
     def fixed(self) -> tuple[Obstacle, ...]:
@@ -271,8 +266,7 @@ class Worlds:
         ]
         margins = [each.margin(_ROBOT) for each in world.fixed]
         robot = replace(_ROBOT, eps=max([_ROBOT.eps, *margins]), margin="paper")
-        start = world.start[:2]
-        velocity = world.start[2:]
+        start, velocity = np.split(world.start, 2)
         stop = start + velocity * np.hypot(*velocity) / (2 * _ROBOT.a_max)
         places = np.array([start, stop, world.goal])
         h = Obstacles.of([*zones, *world.fixed], robot).h(*places.T)
