@@ -42,7 +42,8 @@
 # ## Readers, and what you need to know
 #
 # For final-year students of robotics, control or pedestrian dynamics, for researchers with tracks or a robot, and for lecturers.
-# You read Python (NumPy, pandas), and know vectors, derivatives, means and quantiles. No data has to be fetched.
+# You read Python (NumPy, pandas), and know vectors and matrices, eigenvectors, derivatives, least squares, means, standard
+# deviations, quantiles and the exponential distribution. No data has to be fetched.
 #
 # - Notebooks 01 to 13 are the *chapters*: each builds on earlier ones. Control theory begins in chapter 07. Notebooks 21 to 29,
 #   in the folder `deeper`, answer further questions.

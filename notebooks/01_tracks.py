@@ -128,7 +128,7 @@ real_day.compare_with_plaza(record, numbers, note)
 #
 # A sensor sees a person at x = 5.00 m, and 0.05 s later at x = 5.06 m. How fast is that?
 #
-# 6 cm in 0.05 s are **1.2 m/s**. But each position may be wrong by 1 cm. Then the person moved by something
+# 6 cm in 0.05 s are **1.2 m/s**. But let each position be wrong by at most 1 cm. Then the person moved by something
 # between 4 cm and 8 cm: at 0.8 to 1.6 m/s. The two samples say little.
 #
 # Now take two samples that are 1 s apart: 1.20 m. The same errors give **1.18 to 1.22 m/s**.
@@ -141,7 +141,7 @@ def measure_speed(x, t, span):
 
 
 t = np.arange(0, 10, 0.05)
-x = 1.2 * t + np.random.default_rng(0).normal(0, 0.01, len(t))  # 1.2 m/s, errors of 1 cm
+x = 1.2 * t + np.random.default_rng(0).normal(0, 0.01, len(t))  # 1.2 m/s; standard deviation 1 cm
 
 # %% [markdown]
 # **What do you think?** The person walks at exactly 1.2 m/s. Between which values does the measured speed lie,
@@ -166,7 +166,8 @@ record.figure(fig, "noise")
 #
 # Two errors with standard deviation $\sigma$ make a speed with standard deviation $\sqrt2\,\sigma / \Delta t$, where
 # $\Delta t$ is the time between the samples. With $\sigma$ = 1 cm that is 14 cm/s over 0.1 s, and 1.4 cm/s over
-# 1 s. Over 1 s a real change of speed is smoothed, too. That is the price.
+# 1 s. Nearly all measured speeds lie within two standard deviations: 0.92 to 1.48 m/s, and 1.17 to 1.23 m/s. Over 1 s a real
+# change of speed is smoothed, too. That is the price.
 #
 # </details>
 

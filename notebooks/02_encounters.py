@@ -116,7 +116,7 @@ numbers = {
     "encounters in a person-hour": f"{count / (len(tracks) / 36_000):.3g}",
     "of companions": f"{companions:.0%}",
     "of people who walk towards each other": f"{(first['kind'] == 'opposite').mean():.0%}",
-    "one encounter in twenty comes nearer than": f"{near:.2f} m",
+    "one in twenty of the encounters within 2 m comes nearer than": f"{near:.2f} m",
 }
 note = (
     "The plaza is built to be busy: every pair meets. Here most people are never alone with one other person, and "
@@ -252,8 +252,8 @@ record.figure(fig, "windows")
 # <details><summary>Answer</summary>
 #
 # A longer window finds fewer. The conditions have to hold longer: both people must be tracked, the space must stay in the
-# area, and nobody else may enter. Also one meeting gives fewer windows that do not overlap: a meeting of 7 s is
-# six encounters of 1 s, two of 3 s, and one of 5 s. So a number of encounters says nothing without the length of the window.
+# area, and nobody else may enter. Also one meeting gives fewer windows that do not share a sample. A window of 1 s has 11
+# samples, so the next one begins 1.1 s later: a meeting of 7 s is six encounters of 1 s, two of 3 s, and one of 5 s. So a number of encounters says nothing without the length of the window.
 # (The plaza of this figure has 500 pairs who are seen for 8 s.)
 #
 # </details>
@@ -363,7 +363,7 @@ lost = {reason: n for stage in funnels.get(samples)[-2:] for reason, n in stage[
 reason = max(lost, key=lost.get)
 Markdown(
     f"**What we know now.** There are {count:,} encounters, {per_day:,.0f} a day; the paper has 176 a day. At most other moments no "
-    f"encounter opens. The main reason: {reason}. One encounter in twenty comes nearer than {near:.2f} m; around a walking person "
+    f"encounter opens. The main reason: {reason}. Of the encounters within 2 m, one in twenty comes nearer than {near:.2f} m; around a walking person "
     f"there is a place where few others are. The nearest of all came to {samples['distance'].min():.2f} m: is that true? Chapter 03 asks."
 )
 

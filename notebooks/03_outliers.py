@@ -195,8 +195,8 @@ record.check(
 # About 1: LOF takes them for a crowd. Each of the three has its two nearest neighbours among the three. Seen
 # from inside a small group, everything is dense.
 #
-# Remember this. An encounter has 31 samples, 0.1 s apart. LOF with 20 neighbours compares a sample with 20 others of
-# the *same encounter*. The samples of a slow intruder are such a small group.
+# Remember this. An encounter has 31 samples, 0.1 s apart. LOF with 20 neighbours asks
+# whether a sample is more alone than its 20 nearest samples are. The samples of slow intruders lie near each other.
 #
 # </details>
 
@@ -392,7 +392,7 @@ record.claim(what, paper.max() <= 0.05, f"off by {paper.min():.2f} to {paper.max
 # What we know now
 left_by_whole = r[~whole_rule].min()
 Markdown(
-    f"**What we know now.** LOF compares a point with its neighbours; a group of three is enough to hide. Therefore the rule of 0.2 % finds "
+    f"**What we know now.** LOF compares a point with its neighbours; a group that is larger than their number can hide in itself. And a quota is a limit. The rule of 0.2 % finds "
     f"{record.key['quota: recall']:.0%} of the samples of slow intruders, and the rule for whole encounters {recall:.0%}. In this data "
     f"({all_near:,} encounters within {r_max:g} m) the rule for encounters removes {close.loc[whole_rule, 'encounter'].nunique()}, and the nearest sample is "
     f"then at {left_by_whole:.2f} m. With few encounters hardly any is removed, and the nearest stay in. Chapter 04 puts a hull around what the paper's rule leaves."

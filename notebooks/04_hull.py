@@ -330,7 +330,8 @@ Markdown(
 Large. The zone is smallest at {smallest:.2f} m/s ({np.nanmin(areas):.1f} m²), {where} speeds of this data. It grows
 towards both ends, to {areas[np.isfinite(areas)][0]:.1f} m² at {known[0]:.2f} m/s and to
 {areas[np.isfinite(areas)][-1]:.1f} m² at {known[-1]:.2f} m/s. There the hull closes like the end of an egg: its slices
-shrink to a point, so the zone grows up to the whole circle of {np.pi * r_max**2:.1f} m². That happens whatever people do.
+become small, so the zone grows towards the whole circle of {np.pi * r_max**2:.1f} m². As soon as a slice leaves a side
+without anybody, there is no zone. That happens whatever people do.
 Number of encounters in the last 0.1 m/s: {people[int((known[-1] - tenths[0]) / 0.1)]}.
 
 </details>"""
@@ -441,8 +442,8 @@ Markdown(
 - **"The ellipse around the slice is the zone."** No. The slice is large where the zone is small. The ellipse around
   this slice is {wrong.semi_axes[0]:.2f} m x {wrong.semi_axes[1]:.2f} m, the zone's
   {fitted.semi_axes[0]:.2f} m x {fitted.semi_axes[1]:.2f} m. Map back first, then enclose.
-- **"A large zone at {high:.1f} m/s means that others leave much room to fast walkers."** No. A hull is large in the
-  middle of the data and closes at its ends, so the zone is large there for any people."""
+- **"A large zone at {high:.1f} m/s means that others leave much room to fast walkers."** No. A hull
+  closes at the lowest and at the highest speed of the data, so near both the zone is large for any people."""
 )
 
 # %% jupyter={"source_hidden": true}

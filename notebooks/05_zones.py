@@ -462,7 +462,8 @@ Markdown(
 | encounters | {len(everyone):,} | {atc["encounters"]:.0f} | 16,181 |
 | hull at {zone_speed:g} m/s, longer semi-axis | {hull.semi_axes[0]:.2f} m | {atc["hull_a"]:.2f} m (1.1 m/s) | only a figure, no number |
 
-With {atc["encounters"]:.0f} encounters, no zone of the real day is usable at any speed: too few people were seen behind."""
+No zone of the real day is usable at any speed. The verdict of its copy names the reasons: {atc["encounters"]:.0f} encounters where 600 are
+needed, fewer than 20 people on several sides, many groups, and a tracker that loses people who are nearer than 1 m."""
 )
 
 # %% jupyter={"source_hidden": true}
@@ -490,8 +491,8 @@ Markdown(
 first, last = (found["quantile"][n]["a"] for n in (min(found["quantile"]), max(found["quantile"])))
 Markdown(
     f"""**What we know now.** At {zone_speed:g} m/s the zone is {kept.semi_axes[0]:.2f} m x {kept.semi_axes[1]:.2f} m. In each
-direction some {100 * q:g} % of the encounters come nearer; somewhere, more than {100 * q:g} % do, because they are others in each
-direction. Other people would have given {row["a_low"]:.2f} to {row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
+direction some {100 * q:g} % of the encounters come nearer. These are different encounters in each direction, so more than
+{100 * q:g} % enter the zone somewhere. Other people would have given {row["a_low"]:.2f} to {row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
 semi-axis changed by {100 * (last - first):+.0f} cm. The verdict is *{verdict}*, and the zone is stored in `zone.json`: the robot of
 chapters 07 to 13 reads it there. Do people keep out of this zone, or is it only empty? Chapter 06 asks."""
 )

@@ -16,6 +16,7 @@
 #     row: '12'
 #     needs:
 #     - '07'
+#     - '10'
 #     week: 6
 # ---
 
@@ -30,7 +31,8 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [12](12_among_people.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min · needs [07](07_barriers.ipynb)
+# [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min · needs [07](07_barriers.ipynb) · needs
+# [10](10_corridor.ipynb)
 #
 # **Afterwards you can** try out a scene of your own, live, and hand its settings on.
 
@@ -85,9 +87,10 @@ Laboratory(zone=zone) if is_interactive() else None
 # 13 cm higher, but still a little below 0: gamma = 0.5 is too large for this look ahead.</details>
 #
 # **3. The paper's settings against `among_people()`.** Choose `MPCSettings.paper()`, and compare with
-# `MPCSettings.among_people()` in *corridor*.
-# <details><summary>What to expect</summary>The paper's robot meets the person head-on, keeps the zone free, and needs at
-# least 2 s longer. The other one plans 3 s ahead, and turns aside early. It may pay for a short way through the edge of the
+# `MPCSettings.among_people()` in *corridor*. (Items 3 and 9: chapter 12 explains `among_people()`, the settings with a longer
+# horizon and with priorities.)
+# <details><summary>What to expect</summary>The paper's robot meets the person head-on, keeps the zone free, and needs
+# almost 5 s longer. The other one plans 3 s ahead, and turns aside early. It may pay for a short way through the edge of the
 # zone; then "not safe" appears. It touches nobody.</details>
 #
 # **4. A narrower corridor.** Drag the four ends of its walls to y = 1.8 and -1.8 m. Who goes first?

@@ -37,8 +37,8 @@ from szlib.workbook import figures
 # ## 1.1 Velocity (5 min)
 #
 # `path` holds a person's positions, shape (n, 2) [m], one each 0.1 s. Give their velocity (vx, vy)
-# [m/s] at tick `k`: the displacement from `half` ticks before to `half` ticks after it, over the time
-# between. (szlib takes half a second to either side: a step is about as long, and shorter spans see
+# [m/s] at tick `k` (row k of `path`): the displacement from `half` ticks before to `half` ticks after it,
+# over the time between. (szlib takes half a second to either side: a step is about as long, and shorter spans see
 # the body sway.)
 
 

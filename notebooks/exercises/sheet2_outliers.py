@@ -123,7 +123,7 @@ plt.show()
 #
 # LOF removes the samples that lie apart from their neighbours. Explain to somebody who has never heard of
 # LOF why it does not find the intruder of 2.4, and what you would remove instead. What may your rule do
-# wrong? Write five to eight sentences.
+# wrong? Compare the precision or the recall of the two rules. Write five to eight sentences.
 
 # %% [markdown]
 # YOUR ANSWER HERE

@@ -74,7 +74,8 @@ judges.check("speed_limit", speed_limit)
 # ## 4.3 In your own words (10 min)
 #
 # Your zone of 4.1 is within 10 cm on synthetic plazas. Name three reasons why it may be farther off in a
-# real hall, and for each of them what you would look at in the data to notice it. Write five to eight
+# real hall, and for each of them what you would look at in the data to notice it. Say which of the three more
+# data would not mend, and how your choice of quantile and of the range of speeds matters. Write five to eight
 # sentences.
 
 # %% [markdown]

@@ -156,7 +156,7 @@ judges.check("expected_nearest", expected_nearest)
 # %% [markdown]
 # **Solution.** All n keep more than x with probability exp(-x / mean)^n = exp(-n x / mean). So the
 # nearest is exponential again, with mean / n. On a real day there is no sharp edge behind it, and the
-# hull goes on shrinking: that is why chapter 06 looks at a quantile, which settles.
+# hull goes on shrinking: that is why chapter 05 takes a quantile, which settles.
 
 # %%
 counts = np.geomspace(10, 1000, 20).astype(int)

@@ -53,16 +53,18 @@ def my_zone(samples, speed):
     """The zone at this speed [m/s], a szlib.Ellipse in the person's frame."""
     ### BEGIN SOLUTION
     close = samples[(samples["distance"] <= 2) & samples["speed"].between(speed - 0.2, speed + 0.2)]
-    zone = szlib.Ellipse((0, 0), (1, 1))
+    zone = szlib.Ellipse((0, 0), (1, 1))  # a first guess [m]
 
-    def reach(theta):  # of the zone found last, in the direction theta [m]
+    def reach(theta):  # of the present zone in the direction theta [m]
         curve = zone.curve()
         return np.interp(theta, np.arctan2(curve[:, 1], curve[:, 0]), np.hypot(*curve.T), period=2 * np.pi)
 
-    for quantile in (0.07, 0.015, 0.015):
-        # A long zone changes within a sector, so distances are shares of its reach.
+    # First a rough zone, from a quantile above the share of people in a sector who walk through. Then twice
+    # without encounters that come nearer than 3/4 of the present zone: a lower quantile is enough.
+    for turn, quantile in enumerate((0.07, 0.015, 0.015)):
+        # The reach of a long zone differs within a sector: divide each distance by the reach there.
         close = close.assign(share=close["distance"] / reach(close["los_angle"]))
-        if quantile < 0.07:  # from the second round on: people who came far into the zone are left out
+        if turn > 0:
             close = close[close.groupby("encounter")["share"].transform("min") > 0.75]
         edge = []
         for theta in np.radians(np.arange(-180, 180, 10)):
@@ -108,7 +110,8 @@ judges.check("speed_limit", speed_limit)
 # ## 4.3 In your own words (10 min)
 #
 # Your zone of 4.1 is within 10 cm on synthetic plazas. Name three reasons why it may be farther off in a
-# real hall, and for each of them what you would look at in the data to notice it. Write five to eight
+# real hall, and for each of them what you would look at in the data to notice it. Say which of the three more
+# data would not mend, and how your choice of quantile and of the range of speeds matters. Write five to eight
 # sentences.
 
 # %% [markdown]

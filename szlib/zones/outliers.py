@@ -4,8 +4,8 @@ LOF finds points in sparse places, and people are sparse close to each other, wh
 ends. The complementary distance r' = r_max - r turns the data inside out: the many people who keep their
 distance gather around the origin, and the few who come close lie on the outside.
 
-The paper removes a fixed share of the samples. An encounter has 31 samples, so 20 neighbours of an
-intruder's sample belong to the same intruder. And a fixed share can neither grow with the number of
+The paper removes a fixed share of the samples. But the samples of slow intruders lie near each other: they
+are a group, in which LOF finds nobody alone. And a fixed share can neither grow with the number of
 intruders nor stop when there are none. So by default *whole encounters* are judged: the nearest approach of
 each is compared with those of a share of all others.
 """

@@ -41,7 +41,7 @@ BY_HAND = {
     "06": {
         "0.6": 0.6,
         "3.4": WINDOW,
-        "4.6": math.sqrt(100 * 0.3 * 0.7),
+        "4.58": math.sqrt(100 * 0.3 * 0.7),
         "4.4": 20 / math.sqrt(100 * 0.3 * 0.7),
         "40": 2 / 0.05,
         "80": 80,  # minutes of the video of Grand Central
