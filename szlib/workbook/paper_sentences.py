@@ -8,21 +8,13 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
+from .claims import judge
 from .record.display import format_result
 from .record.notebook_record import NotebookRecord
-
-NOT_RUN = "not run with this data"  # verdict of a sentence whose checks were not made in this run
-_FIXED = {
-    "untestable": "untestable here",
-    "open": "not done here",
-}  # verdicts that no check decides
-_TESTS = "tests/"  # begins the name of a test, which a run does not execute
 
 
 def load_sentences() -> pd.DataFrame:
@@ -83,24 +75,3 @@ def judge_sentences(record: NotebookRecord) -> pd.DataFrame:
         for names in table["held_by"]
     ]
     return table
-
-
-def judge(
-    kind: str, names: Sequence[str], checks: Mapping[str, Mapping[str, Any]]
-) -> str:
-    """The verdict of a sentence of this `kind`, from the `checks` of a run that have these `names`.
-
-    Tests among the names do not count: a run does not execute them.
-    """
-    names = [name for name in names if not name.startswith(_TESTS)]
-    if kind in _FIXED:
-        return _FIXED[kind]
-    if not all(name in checks for name in names):
-        return NOT_RUN
-    failed = [checks[name]["result"] for name in names if not checks[name]["passed"]]
-    if kind != "claim":
-        return f"{kind}, but a check fails" if failed else kind
-    if not failed:
-        return "supported"
-    is_open = all(result.startswith("not decidable") for result in failed)
-    return "not decidable" if is_open else "not supported"

@@ -26,7 +26,8 @@ from ..plaza.settings import PlazaSettings
 from ..simulation import SCENARIOS
 from ..tracks import datasets, funnels
 from . import folders
-from .paper_sentences import NOT_RUN, judge, load_sentences
+from .claims import NOT_RUN, judge
+from .paper_sentences import load_sentences
 from .record.data_cache import read_stored_zone
 from .record.display import format_value
 from .record.parameters import METHOD_DEFAULTS

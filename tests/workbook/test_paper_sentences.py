@@ -9,7 +9,7 @@ import jupytext
 import nbformat
 import pytest
 
-from szlib.workbook import folders, paper_sentences
+from szlib.workbook import claims, folders, paper_sentences
 from szlib.workbook.record import NotebookRecord
 
 ROOT = Path(__file__).parents[2]
@@ -109,6 +109,11 @@ RUN = {
         "result": "not decidable here",
         "value": "n = 3",
     },
+    "07: is mostly right": {
+        "passed": False,
+        "result": "mostly supported",
+        "value": "0.8",
+    },
     "07: breaks": {"passed": False, "result": "FAILED", "value": 1},
 }
 
@@ -120,23 +125,25 @@ RUN = {
         ("claim", ["07: is right", "07: is left"], "not supported"),
         ("claim", ["07: is right", "07: is neither"], "not decidable"),
         ("claim", ["07: is left", "07: is neither"], "not supported"),
-        ("claim", ["07: is right", "08: is right"], paper_sentences.NOT_RUN),
+        ("claim", ["07: is right", "07: is mostly right"], "mostly supported"),
+        ("claim", ["07: is right", "07: breaks"], "not supported"),
+        ("claim", ["07: is right", "08: is right"], claims.NOT_RUN),
         ("claim", ["07: is right", "tests/test_a.py::test_a"], "supported"),
         ("implemented", ["07: arrives"], "implemented"),
-        ("implemented", ["tests/test_a.py::test_a"], "implemented"),
+        ("implemented", ["tests/test_a.py::test_a"], "implemented, by test"),
         (
             "implemented",
             ["07: arrives", "07: breaks"],
             "implemented, but a check fails",
         ),
-        ("altered", ["08: arrives"], paper_sentences.NOT_RUN),
+        ("altered", ["08: arrives"], claims.NOT_RUN),
         ("altered", ["07: breaks"], "altered, but a check fails"),
         ("untestable", ["07: breaks"], "untestable here"),
         ("open", ["08: arrives"], "not done here"),
     ],
 )
 def test_verdict_follows_from_the_checks(kind, names, verdict):
-    assert paper_sentences.judge(kind, names, RUN) == verdict
+    assert claims.judge(kind, names, RUN) == verdict
 
 
 def test_checks_come_from_the_records_of_the_run(tmp_path, monkeypatch):
@@ -166,7 +173,7 @@ def test_checks_come_from_the_records_of_the_run(tmp_path, monkeypatch):
     assert table["verdict"].tolist() == [
         "supported",
         "not decidable",
-        *2 * [paper_sentences.NOT_RUN],
+        *2 * [claims.NOT_RUN],
     ]
     assert table["numbers"].iloc[0] == "07: arrives: holds (0.25)"
     assert table["unknown"].tolist() == [[], [], ["07: stops"], []]

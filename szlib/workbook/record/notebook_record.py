@@ -142,12 +142,15 @@ class NotebookRecord:
         Parameters
         ----------
         what : the claim, as a statement.
-        supported : whether the data supports it; None or NaN if it cannot decide. If not, the run goes on.
+        supported : whether the data supports it; None or NaN if it cannot decide; or one of
+            `claims.VERDICTS`. If not, the run goes on.
         value : the number, or the numbers, that decide it.
         """
         result = "supported" if supported else "not supported here"
         if supported is None or supported != supported:
             result = "not decidable here"
+        if isinstance(supported, str):
+            result, supported = supported, supported == "supported"
         self._record("claim", what, _is_true(supported), value, result)
 
     def figure(self, figure: Figure, name: str) -> None:
