@@ -92,7 +92,7 @@ scenario_runs.list_parameters(
 # side, in ours the rule of the side (chapter 09).
 
 # %%
-scenario_runs.tabulate_five(runs.by_name())
+scenario_runs.tabulate_five(runs.all_by_name())
 
 # %% [markdown]
 # Our run, step by step. The numbers are times in seconds: a 4 marks where the robot and the person are at 4 s. Later is

@@ -110,8 +110,8 @@ scenario_runs.list_parameters(
 # the side changes only where the robot steps aside. The same five numbers describe a run in chapters 09 to 11:
 
 # %%
-named = {f"waiting, {name}": run for name, run in waiting.by_name().items()}
-named |= {f"making room, {name}": run for name, run in making_room.by_name().items()}
+named = {f"waiting, {name}": run for name, run in waiting.all_by_name().items()}
+named |= {f"making room, {name}": run for name, run in making_room.all_by_name().items()}
 scenario_runs.tabulate_five(named)
 
 # %% [markdown]

@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
+import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -24,8 +25,11 @@ from pathlib import Path
 from typing import Any
 
 import joblib
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from studies.claims import SITES
 from studies.committed import study, write_table
 from studies.lesson_zones import WIDEST
@@ -78,6 +82,7 @@ CONTROLS = (NO_BARRIER, DISTANCE, CIRCLE)
 LARGER = 1.2
 SLOWER = 0.05
 """By how much slower a robot is beside the person, as a share of its greatest speed, if a barrier slows it."""
+NO_SCENARIO = "-"
 FOLDER = Path("../results/paper_matrix")
 
 
@@ -220,11 +225,15 @@ def judge_run(run: Run, zone: szlib.Ellipse, settings: szlib.MPCSettings, contro
     return answers
 
 
-def judge_zone(zone: szlib.Ellipse, names: Sequence[str] = tuple(SCENARIOS)) -> Iterator[dict[str, Any]]:
-    """Each claim about a robot with this `zone`: one row a claim, a scenario and a condition."""
-    conditions = [(name, settings, "") for name, settings in ROBOTS.items()]
-    conditions += [(name, ROBOTS["the paper's"], name) for name in CONTROLS]
-    for condition, settings, control in conditions:
+def judge_zone(
+    zone: szlib.Ellipse,
+    names: Sequence[str] = tuple(SCENARIOS),
+    conditions: Sequence[str] = (*ROBOTS, *CONTROLS),
+) -> Iterator[dict[str, Any]]:
+    """Each claim about a robot with this `zone`: one row a claim, a scenario of these `names` and a condition."""
+    for condition in conditions:
+        settings = ROBOTS.get(condition, ROBOTS["the paper's"])
+        control = condition if condition in CONTROLS else ""
         for name in (each for each in names if has_room(SCENARIOS[each], zone)):
             run = drive(SCENARIOS[name], zone, settings, control)
             for claim, holds in judge_run(run, zone, settings, control).items():
@@ -278,7 +287,7 @@ def list_chains(zones: pd.DataFrame) -> Iterator[dict[str, Any]]:
             yield {
                 **{name: row[name] for name in ("source", "draw")},
                 "claim": claim,
-                "scenario": "",
+                "scenario": NO_SCENARIO,
                 "condition": row["chain"],
                 "holds": bool(holds),
             }
@@ -300,13 +309,50 @@ def count(rows: pd.DataFrame) -> pd.DataFrame:
 def recompute(row: pd.Series) -> dict[str, int]:
     """The first draw of a cell, again: of robots with any zone, of chains on a plaza."""
     zones = read_table("28_zones").query(f"source == {row['source']!r} and draw == {row['draw']}")
-    if not row["scenario"] or row["scenario"] != row["scenario"]:
+    if row["scenario"] == NO_SCENARIO:
         rows = list_chains(pd.DataFrame(list_zones(row["source"], [int(row["draw"])])))
     else:
         zone = read_zone(zones.query('chain == "the paper\'s"').iloc[0])
-        rows = judge_zone(zone, [row["scenario"]])
+        rows = judge_zone(zone, [row["scenario"]], [row["condition"]])
     asked = {name: row[name] for name in ("claim", "condition")}
     return {"probe": next(int(each["holds"]) for each in rows if asked.items() <= each.items())}
+
+
+# --- the picture -------------------------------------------------------------------------------------
+
+
+def draw_matrix(matrix: pd.DataFrame) -> Figure:
+    """Draw the share of draws in which each claim holds, by source and by condition."""
+    robots = matrix[matrix["scenario"] != NO_SCENARIO]
+    chains = matrix[matrix["scenario"] == NO_SCENARIO]
+    parts = [(robots, (*ROBOTS, *CONTROLS), "robot, and controls"), (chains, tuple(CHAINS), "chain")]
+    heights = [part["claim"].nunique() for part, _, _ in parts]
+    shape = {"height_ratios": heights, "width_ratios": (len(SOURCES), len(ROBOTS) + len(CONTROLS))}
+    figure, panels = plt.subplots(2, 2, figsize=(12.5, 10), layout="constrained", gridspec_kw=shape)
+    for (part, conditions, title), (left, right) in zip(parts, panels, strict=True):
+        names = list(dict.fromkeys(part["claim"]))
+        _draw_shares(left, part[~part["is_control"]], "source", list(SOURCES), names)
+        _draw_shares(right, part, "condition", list(conditions), names)
+        left.set_yticks(range(len(names)), [textwrap.fill(name, 40) for name in names], fontsize=9)
+        left.set_title("zones of", fontsize=10)
+        right.set_title(title, fontsize=10)
+        right.set_yticks([])
+    panels[0, 1].axvline(len(ROBOTS) - 0.5, color="black", linewidth=2)
+    figure.suptitle("Share of zones in which each claim of the paper holds [%]")
+    return figure
+
+
+def _draw_shares(ax: Axes, cells: pd.DataFrame, factor: str, levels: list[str], names: list[str]) -> None:
+    """Draw one panel: claims by the levels of a factor."""
+    sums = cells.groupby(["claim", factor])[["held", "draws"]].sum()
+    shares = (100 * sums["held"] / sums["draws"]).unstack().reindex(index=names, columns=levels)
+    ax.imshow(np.ma.masked_invalid(shares), cmap="cividis", vmin=0, vmax=100, aspect="auto")
+    for (i, j), share in np.ndenumerate(shares.to_numpy()):
+        if np.isfinite(share):
+            colour = "black" if share > 50 else "white"
+            ax.text(j, i, f"{share:.0f}", ha="center", va="center", color=colour, fontsize=8)
+    ax.set_xticks(range(len(levels)), levels, rotation=40, ha="right", fontsize=9)
+    ax.tick_params(length=0)
 
 
 def main() -> None:

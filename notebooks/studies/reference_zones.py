@@ -22,6 +22,8 @@ from szlib.core.files import write_file
 from szlib.zones.reference_zones import FILE
 
 SPEED = 1.1
+PAPERS = 16_181
+"""Encounters of the paper (sec. 2)."""
 SOURCES = {
     "atc-strangers": (
         "atc-1hz",
@@ -45,6 +47,8 @@ def main() -> None:
     zones = {name: fit(asked, site) for name, (site, _, _) in SOURCES.items()}
     entries = {name: describe(name, zone) for name, zone in zones.items()}
     entries["pooled-strangers"] = describe_pooled(zones)
+    entries["atc-paper"] = describe_paper(asked, None)
+    entries["atc-paper-strangers"] = describe_paper(asked, "strangers")
     entries["hall"] = {
         "ellipse": {"center": [0.0, 0.0], "semi_axes": [1.2, 1.2], "angle": 0.0},
         "intervals": {},
@@ -80,11 +84,7 @@ def describe(name: str, zone: szlib.SocialZone) -> dict[str, Any]:
         method, ends = "radius of respect, all directions pooled", {"radius": [respect.low, respect.high]}
     _, source, cite = SOURCES[name]
     return {
-        "ellipse": {
-            "center": [round(value, 3) for value in ellipse.center],
-            "semi_axes": [round(value, 3) for value in ellipse.semi_axes],
-            "angle": round(ellipse.angle, 3),
-        },
+        "ellipse": round_ellipse(ellipse),
         "intervals": {key: [round(float(end), 3) for end in pair] for key, pair in sorted(ends.items())},
         "n_encounters": int(zone.provenance["encounters"]),
         "method": method,
@@ -92,6 +92,37 @@ def describe(name: str, zone: szlib.SocialZone) -> dict[str, Any]:
         "reasons": list(verdict.reasons),
         "source": source,
         "cite": cite,
+    }
+
+
+def describe_paper(asked: argparse.Namespace, kind: str | None) -> dict[str, Any]:
+    """The entry of the zone of the ATC day by the paper's chain, of everybody or of people of a `kind`."""
+    site, source, cite = SOURCES["atc-strangers"]
+    samples, _ = data_and_null(site, asked)
+    people = szlib.of_kind(samples, kind) if kind else samples
+    with warnings.catch_warnings(action="ignore", category=szlib.DataWarning):
+        zone = szlib.SocialZone.fit(people, method="paper", speeds=(SPEED,), n_resamples=0)
+    n = int(zone.provenance["encounters"])
+    return {
+        "ellipse": round_ellipse(zone.ellipse(SPEED)),
+        "intervals": {},
+        "n_encounters": n,
+        "method": "paper",
+        "verdict": "undecided",
+        "reasons": [
+            f"the zone of a hull shrinks as encounters are added: the paper has {PAPERS / n:.0f} times as many"
+        ],
+        "source": source if kind else source.replace("strangers", "everybody"),
+        "cite": cite,
+    }
+
+
+def round_ellipse(ellipse: szlib.Ellipse) -> dict[str, Any]:
+    """The numbers of an `ellipse`, to 1 mm."""
+    return {
+        "center": [round(value, 3) for value in ellipse.center],
+        "semi_axes": [round(value, 3) for value in ellipse.semi_axes],
+        "angle": round(ellipse.angle, 3),
     }
 
 

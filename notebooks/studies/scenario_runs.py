@@ -18,6 +18,7 @@ from studies import paper_claims
 from studies.lesson_zones import choose_paper_zone, choose_zone
 
 import szlib
+from szlib.control.settings import TOLERANCE
 from szlib.simulation.metrics import ACTIVE_RESIDUAL
 from szlib.simulation.robot_run import Run
 from szlib.simulation.scenario import Scenario
@@ -33,6 +34,8 @@ FIVE_NUMBERS = {
 }
 """The five numbers that the chapters show of a run: the metric, and its name with the unit."""
 PAPERS, OURS = "the paper's chain", "ours"
+ATC_ZONE = "atc-paper"
+ON_ATC = "the paper's chain, zone of the ATC day"
 STYLES = {PAPERS: ("--", figures.ORANGE), OURS: ("-", figures.BLUE)}
 PASSAGE = (0.0, 3.0)
 """Both ends of the passage of the scenarios "waiting" and "making_room" [m]."""
@@ -40,14 +43,20 @@ PASSAGE = (0.0, 3.0)
 
 @dataclass(frozen=True)
 class ScenarioRuns:
-    """Both runs of a scenario: `paper`, with the paper's zone and settings, and `ours`."""
+    """The runs of a scenario: `paper`, by the paper's chain, `ours`, and `atc`, by the paper's chain with the zone
+    that it gives for a day of the paper's mall."""
 
     paper: Run
     ours: Run
+    atc: Run
 
     def by_name(self) -> dict[str, Run]:
-        """Both runs, by the names that figures and tables show."""
+        """The runs that figures show, by their names."""
         return {PAPERS: self.paper, OURS: self.ours}
+
+    def all_by_name(self) -> dict[str, Run]:
+        """The runs that tables show, by their names."""
+        return {PAPERS: self.paper, ON_ATC: self.atc, OURS: self.ours}
 
 
 def paper_settings(settings: szlib.MPCSettings) -> szlib.MPCSettings:
@@ -62,9 +71,11 @@ def drive(scenario: Scenario, zone: szlib.Ellipse, settings: szlib.MPCSettings) 
 
 
 def drive_both(record: NotebookRecord, scenario: Scenario, settings: szlib.MPCSettings) -> ScenarioRuns:
-    """Drive a `scenario` with the paper's chain, and with our zone and `settings`."""
-    paper = drive(scenario, choose_paper_zone(record), paper_settings(settings))
-    return ScenarioRuns(paper, drive(scenario, choose_zone(record), settings))
+    """Drive a `scenario` with the paper's chain, on this data and on the ATC day, and with our zone and `settings`."""
+    papers = paper_settings(settings)
+    paper = drive(scenario, choose_paper_zone(record), papers)
+    atc = drive(scenario, szlib.reference_zone(ATC_ZONE).ellipse, papers)
+    return ScenarioRuns(paper, drive(scenario, choose_zone(record), settings), atc)
 
 
 def list_parameters(settings: szlib.MPCSettings, *more: tuple[str, object, str, str]) -> Styler:
@@ -78,7 +89,12 @@ def list_parameters(settings: szlib.MPCSettings, *more: tuple[str, object, str, 
             *more,
             ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
             ("gamma", settings.gamma, TUNED, "on these four scenarios; in 2,000 other worlds: chapter 09"),
-            ("a_max; Q, R, P", f"{settings.a_max} m/s²; as in chapter 08", ASSUMED, "the paper gives none"),
+            (
+                "a_max; Q, R, P",
+                f"{settings.a_max} m/s²; as in chapter 08",
+                ASSUMED,
+                "the paper gives none, its code others",
+            ),
             ("head_on_share", settings.head_on_share, ASSUMED, "ours: where the rule of the side acts"),
             ("the paper's chain", "", PAPER, differences),
         ]
@@ -86,15 +102,19 @@ def list_parameters(settings: szlib.MPCSettings, *more: tuple[str, object, str, 
 
 
 def tabulate_five(runs: Mapping[str, Run]) -> pd.DataFrame:
-    """The five numbers of each run, one row a run."""
+    """The five numbers of each run, its side, and how many of the paper's claims hold: one row a run."""
     found = {name: run.metrics() for name, run in runs.items()}
     rows = {name: [metrics[key] for key in FIVE_NUMBERS] for name, metrics in found.items()}
-    return pd.DataFrame.from_dict(rows, orient="index", columns=list(FIVE_NUMBERS.values())).round(2)
+    table = pd.DataFrame.from_dict(rows, orient="index", columns=list(FIVE_NUMBERS.values())).round(2)
+    table["side"] = [metrics["passing_side"] for metrics in found.values()]
+    held = {name: [claim.check(run)[0] for claim in run.scenario.claims] for name, run in runs.items()}
+    table["claims that hold"] = [f"{sum(each)} of {len(each)}" for each in held.values()]
+    return table
 
 
 def record_safety(record: NotebookRecord, runs: ScenarioRuns, prefix: str = "") -> None:
-    """Record what must hold for our run with any zone that leaves the scene passable, and for the paper's."""
-    found, honest = runs.ours.metrics(), runs.paper.metrics()["unflagged_violations"]
+    """Record what must hold for our run with any zone that leaves the scene passable, and what the paper's do."""
+    found = runs.ours.metrics()
     checks = {
         "the goal is reached": (found["success"], f"after {found['time_to_goal']:.1f} s"),
         "h >= 0 at every step": (found["min_h"] >= 0, f"least h {found['min_h']:.2f} m"),
@@ -110,6 +130,15 @@ def record_safety(record: NotebookRecord, runs: ScenarioRuns, prefix: str = "") 
     }
     for text, (holds, evidence) in checks.items():
         record.check(prefix + text, holds, evidence)
+    for name, run in {PAPERS: runs.paper, ON_ATC: runs.atc}.items():
+        paper = run.metrics()
+        is_safe = paper["min_h"] >= -TOLERANCE and paper["min_clearance"] > 0
+        evidence = (
+            f"goal after {paper['time_to_goal']:.1f} s, least h {paper['min_h']:.2f} m, least clearance "
+            f"{paper['min_clearance']:.2f} m, side {paper['passing_side']}"
+        )
+        record.claim(f"{prefix}{name}: safe, and at its goal", is_safe and paper["success"], evidence)
+    honest = runs.paper.metrics()["unflagged_violations"]
     text = f"{prefix}the paper's chain: no step that called itself safe led to h < 0"
     record.check(text, honest == 0, f"{honest} steps", always=True)
     record.key |= {f"{prefix}{key}": found[key] for key in FIVE_NUMBERS}

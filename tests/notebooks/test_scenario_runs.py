@@ -26,8 +26,12 @@ def test_the_papers_settings_take_our_gamma_and_horizon_and_no_rule_of_the_side(
 
 def test_five_numbers_are_those_of_the_metrics_and_have_units(corridor):
     table = scenario_runs.tabulate_five({"ours": corridor})
-    assert len(table.columns) == 5
-    assert all(name.endswith(("[s]", "[m]", "[m/s]")) for name in table.columns)
+    numbers = [name for name in table.columns if "[" in name]
+    assert len(numbers) == 5
+    assert all(name.endswith(("[s]", "[m]", "[m/s]")) for name in numbers)
+    assert table.loc["ours", "side"] == corridor.metrics()["passing_side"]
+    held = sum(claim.check(corridor)[0] for claim in corridor.scenario.claims)
+    assert table.loc["ours", "claims that hold"] == f"{held} of 1"
     assert table.loc["ours", "least h [m]"] == pytest.approx(
         corridor.metrics()["min_h"], abs=0.005
     )
