@@ -209,7 +209,9 @@ record.check(
 
 # %% jupyter={"source_hidden": true}
 # Checks
-plain_lof = LocalOutlierFactor(n_neighbors=outliers.N_NEIGHBOURS, contamination=fraction)
+plain_lof = LocalOutlierFactor(n_neighbors=20, contamination=fraction)
+differ = int(((plain_lof.fit_predict(points) == -1) != outlier).sum())
+record.check("the quota removes what scikit-learn's LOF with 20 neighbours removes", not differ, f"{differ} differ")
 plain_outlier = plain_lof.fit_predict(plain) == -1
 rim, rim_plain = int((r[outlier] < 1).sum()), int((r[plain_outlier] < 1).sum())
 record.claim(
@@ -327,6 +329,14 @@ by_quota, by_whole = errors.values()
 precision, recall = accuracy.precision_and_recall(whole, intruder)
 record.key |= {"encounters: precision": precision, "encounters: recall": recall}
 record.check("the rule for whole encounters finds the intruders", recall > 0.95, f"recall {recall:.0%}")
+kept = outliers.nearest_approaches(people[~whole])
+left = outliers.complementary_points(kept, r_max=r_max)
+factors = -LocalOutlierFactor(n_neighbors=max(20, -(-len(left) // 50))).fit(left).negative_outlier_factor_
+is_near = (kept["distance"] < kept["distance"].median()).to_numpy()
+what = "of the near encounters that are kept none has an LOF above 2, and of the removed ones each had"
+first = nearest["encounter"].isin(people.loc[whole, "encounter"]).to_numpy()
+is_limit = factors[is_near].max() <= 2 < np.sort(factor[first])[first.sum() // 2]
+record.check(what, is_limit, f"largest {factors[is_near].max():.2f}")
 what = "the rule for whole encounters removes nobody else"
 record.check(what, precision > 0.95, f"precision {precision:.0%}")
 what = "without the encounters of intruders the zone is the true one, to 5 cm"

@@ -346,7 +346,7 @@ print(f"L_f h = {lie(gap, drift, moving):.1f} m/s, L_g h = {first:.0f}, L_g L_f 
 # **Exercise.** A robot with two wheels chooses its speed and its rate of turning. Which relative degree has $h$ for each?
 # <details><summary>Answer</summary>1 for the speed, since the speed moves the robot at once; except where it drives along the
 # edge of the zone: there $L_g h = 0$. 2 for the rate of turning, which changes the heading, and the heading changes
-# where the speed leads.</details>
+# where the speed leads; but none for a robot that stands: there turning never changes $h$.</details>
 #
 # **Higher order.** Take the condition twice (Nguyen & Sreenath, 2016: *exponential* CBF; Xiao & Belta, 2022: *high-order* CBF):
 #
@@ -373,8 +373,8 @@ for rate, (low, hard) in by_rate.items():
     print(f"both rates {rate:g} /s: brakes with at most {hard:.2f} m/s², least h {low:.2f} m")
 
 # %% [markdown]
-# With both rates $\alpha$ a robot at $v$ brakes with up to $\alpha v / e \approx 0.37\,\alpha v$: so $\alpha$ is limited by $a_{max}/v_{max}$, as
-# gamma is by $a_{max}\Delta t / v_{max}$ above.
+# With both rates $\alpha$ a robot at $v$ brakes with up to $\alpha v / e \approx 0.37\,\alpha v$: so $\alpha \le e\,a_{max}/v_{max}$.
+# For gamma the limit was $a_{max}\Delta t / v_{max}$, above.
 #
 # **Proof 1, on paper.** Let $h(0) \ge 0$, $\psi_1(0) \ge 0$ and $\dot\psi_1 + \alpha_2\psi_1 \ge 0$ at all times. Show that $h(t) \ge 0$ at all
 # times. Why is $\psi_1(0) \ge 0$ needed? Give a start with $h(0) > 0$ for which no controller helps.
@@ -421,8 +421,8 @@ for (error, share), low in lags.items():
 # It ends at $-\delta\,\Delta t/\gamma$, and goes no lower: the set $\{h \ge -\delta\,\Delta t/\gamma\}$ is invariant. (This is *input-to-state
 # safety*, Kolathaya & Ames, 2019.) A *smaller* gamma makes it worse here: such a robot corrects an error more slowly.
 #
-# **Exercise.** The margin $\epsilon$ is 5 cm. For which $\delta$ is that enough, with the paper's gamma?
-# <details><summary>Answer</summary>$\delta = \epsilon\gamma/\Delta t$: 2.5 cm/s with gamma = 0.05. Speeds of people are measured with larger errors.
+# **Exercise.** The margin $\epsilon$ is 5 cm. For which $\delta$ is that enough, with gamma = 0.05?
+# <details><summary>Answer</summary>$\delta = \epsilon\gamma/\Delta t$, which is 2.5 cm/s. Speeds of people are measured with larger errors.
 # Errors that change sign from one measurement to the next mostly cancel. An error that lasts does not: the robot then enters the
 # zone, and it touches nobody only because a zone is larger than a body.</details>
 
@@ -560,6 +560,11 @@ h = 1.0
 less, more = (cbf_residual(h - share * gamma * h, h, gamma) for share in (0.6, 1.2))
 claim = f"from h = 1 m it may fall by {60 * gamma:.3g} cm in a step, and not by {120 * gamma:.3g} cm"
 record.check(claim, less > 0 > more, f"residuals {100 * less:+.1f} cm and {100 * more:+.1f} cm", always=True)
+person, aside = szlib.Person((0.0, 0.0), heading=0.0), np.array([1.5, 1.0])
+of_person, of_edge = szlib.MPCCBF(zone, obstacles=[edge], settings=settings).barriers(aside, [person])
+off = max(abs(of_person - (distance(aside) - 0.5 - 0.05)), abs(of_edge - (aside[1] + 1.0 - 0.5 - 0.05)))
+what = "the controller's h is the distance by hand less 0.5 m and 5 cm: of a person, and of an edge"
+record.check(what, off < 1e-12, f"{off:.0e} m off", always=True)
 record.key |= {"v limit at h = 1 m": settings.gamma * h / settings.dt}
 
 # %% [markdown]
@@ -612,8 +617,9 @@ Markdown(
 #
 # - **"h < 0 means a collision."** No. The zone is larger than the body. At $h = 0$ the robot's side is still at
 #   least 5 cm outside the zone. $h < 0$ means that the robot comes closer than people do.
-# - **"A smaller gamma keeps a larger distance."** No. Before a person who stands every gamma ends at the edge of the zone. A
-#   smaller one slows the robot down earlier.
+# - **"A smaller gamma keeps a larger distance."** No. Before a person who stands, a robot that chooses its speed ends at the
+#   edge of the zone with every gamma. A smaller one slows it down earlier. (A robot that chooses its acceleration, with
+#   $N_h = 2$, ends a few centimetres before: see "Distance to an edge".)
 # - **"The barrier stops the robot."** Only if the person stands. If the person comes, $h$ falls although the robot
 #   stands still, and the condition requires that it goes back (chapter 11).
 

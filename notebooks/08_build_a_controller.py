@@ -112,7 +112,7 @@ parameters(
         ("N, N_h", f"{N}, {N_h}", PAPER, "sec. 4: steps of the plan, and those under the barrier condition"),
         ("gamma", gamma, TUNED, "on these four scenarios: chapter 09"),
         ("a_max", f"{a_max} m/s²", ASSUMED, "the paper gives none"),
-        ("Q, R, P", "diag(10, 10, 1, 1), I, 10 Q", ASSUMED, "the paper gives none"),
+        ("Q, R, P", "diag(10, 10, 1, 1), I, 10 Q", ASSUMED, "the paper gives none; its code: below"),
     ]
 )
 
@@ -603,6 +603,27 @@ Markdown(
 # - *The limits.* The paper's "maximum speed 1 m/s" is the Euclidean speed here. It gives no limit of $\mathbf u$.
 # - *$\Delta h$* is computed with the zone where it will be in that step: the paper's robot knows the person's velocity
 #   (sec. 4).
+#
+# *The weights.* The paper gives none. It uses the public code of Zeng, Zhang and Sreenath (2021), which has $Q = 10\,I$,
+# $R = I$, $P = 100\,I$ and gamma = 0.4: there a velocity costs ten times as much as here. `MPCSettings.reference_code()` has
+# these numbers. **What do you think?** With these weights, and our gamma, is the robot sooner at its goal, or later?
+
+# %%
+code = szlib.MPCSettings.reference_code(gamma=gamma)
+for name, scene in szlib.SCENARIOS.items():
+    runs = [
+        szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=each))
+        for each in (szlib.MPCSettings.paper(gamma=gamma), code)
+    ]
+    ours, theirs = (run.metrics()["time_to_goal"] for run in runs)
+    print(f"{name}: {ours:.1f} s with our weights, {theirs:.1f} s with those of the code")
+
+# %% [markdown]
+# <details><summary>Answer</summary>
+#
+# Later: a dear velocity makes the robot slow. Notebook 28 asks which claims of the paper depend on these numbers.
+#
+# </details>
 #
 # ## Three common mistakes
 #

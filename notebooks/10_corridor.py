@@ -119,6 +119,10 @@ movie
 # %% jupyter={"source_hidden": true}
 # Checks
 scenario_runs.record_safety(record, runs)
+spare = log.h[1:] - (1 - gamma) * log.h[:-1]  # eq. 1 of each row and each step
+what = f"in each step h of the person falls by {gamma:.0%} at most, and comes to that limit"
+is_limit = -1e-6 < spare[:, 0].min() < 1e-3 if record.cache.is_synthetic else spare[:, 0].min() > -1e-6
+record.check(what, is_limit, f"{1000 * spare[:, 0].min():.3f} mm left")
 record.check("our robot passes on the chosen side", sides[1] == settings.pass_side, f"side: {sides[1]}")
 
 # %% jupyter={"source_hidden": true}

@@ -310,8 +310,9 @@ Markdown(
 #
 # Two ways on different sides of you differ by a full turn, $2\pi$: their *winding numbers* differ by 1. (If
 # you walk, $\theta_k$ is seen from where you are then. So in front of you and behind you are two classes as
-# well.) Each of $n$ people is passed on one of two sides: that is up to $2^n$ classes, 1,024 among ten
-# people. So szlib does not list them. It finds the cheapest way, raises the price near it, and searches
+# well.) Each of $n$ people is passed on one of two sides: without circling anybody that is up to $2^n$ classes, 1,024 among ten
+# people. (Strictly, winding numbers tell *homology* classes. With two people or more, ways of one homology class may
+# differ in their homotopy class, but only if they go to and fro between people.) So szlib does not list them. It finds the cheapest way, raises the price near it, and searches
 # again, at most three times (after Bhattacharya, Likhachev and Kumar, 2012, who search in all classes).
 
 

@@ -148,7 +148,7 @@ judges.check("end_margin", end_margin)
 
 # %% [markdown]
 # **Solution.** It comes to r^2 / L: with the paper's robot (0.5 m) and margin (5 cm) a wall must be 5
-# m long. The walls of the paper's restricted pathway are shorter; notebook 22 shows the collision.
+# m long. The paper gives no lengths. The walls that we assume for its pathway are shorter; notebook 22 shows the collision.
 
 # %% [markdown]
 # The next three tasks begin a controller; sheet 6 goes on with it. The checks of 5.5 and 5.6 drive a robot with your function

@@ -1,5 +1,6 @@
 """Execute the notebooks, store the copies, and copy the pictures of the README: `make notebooks`."""
 
+import posixpath
 import re
 import shutil
 import sys
@@ -26,18 +27,22 @@ PICTURES = {
 """The pictures of the README, and the figures of the notebooks from which they are copied."""
 WARNING = re.compile(r"^\S+\.py:\d+: (\w*Warning: .*\n)(  .*\n)?", re.MULTILINE)
 """A warning with the path of a file on this machine, and the line that caused it."""
-REAL_DAY = ("01", "02", "03", "04", "05", "06")
-"""Notebooks with a copy on the real day, in the folder `real_day`: `refresh.py real_day`."""
+REAL_DAY = ("01", "02", "03", "04", "05", "06", "09", "10", "11", "28")
+"""Notebooks with a copy on the real day, in the folder `real_day`: `refresh.py real_day [NN ...]`."""
 
 
 def replace_data(source: Path, data: str) -> nbformat.NotebookNode:
     """Read the notebook `source` with other `data`, and with links that start in the folder `real_day`."""
-    notebook = jupytext.read(source)
+    notebook, folder = jupytext.read(source), source.parent.relative_to(HERE).as_posix()
     for cell in notebook.cells:
         if "parameters" in cell.metadata.get("tags", []):
             cell.source = re.sub(r'^data = "\w+"', f'data = "{data}"', cell.source, flags=re.MULTILINE)
         elif cell.cell_type == "markdown":
-            cell.source = re.sub(r"\]\((?!http|#)", "](../", cell.source)
+            cell.source = re.sub(
+                r"\]\((?!http|#)([^)]*)",
+                lambda link: "](" + posixpath.normpath(f"../{folder}/{link[1]}"),
+                cell.source,
+            )
     return notebook
 
 
@@ -76,9 +81,9 @@ def copy_picture(figure: Path, name: str) -> None:
 
 
 def main(names: list[str]) -> None:
-    if names == ["real_day"]:
+    if names[:1] == ["real_day"]:
         for source in folders.list_notebooks():
-            if any(folders.has_name(source, name) for name in REAL_DAY):
+            if any(folders.has_name(source, name) for name in names[1:] or REAL_DAY):
                 print(source.stem, flush=True)
                 refresh(source, "atc-1hz")
         copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png")

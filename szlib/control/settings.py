@@ -46,6 +46,13 @@ _PAPER: dict[str, Any] = {
     "solver": "ipopt",
     "time_limit": inf,
 }
+# Of the public code that the paper uses (Zeng, Zhang and Sreenath, MPC-CBF, examples/test.m).
+_CODE: dict[str, Any] = {
+    "gamma": 0.4,
+    "Q": (10.0,) * 4,
+    "R": (1.0,) * 2,
+    "P": (100.0,) * 4,
+}
 _SOURCES = {
     "gamma": "tuned",
     "Q": "assumed",
@@ -203,6 +210,23 @@ class MPCSettings:
         """
         return cls(**_PAPER | changes)
 
+    @classmethod
+    def reference_code(cls, **changes: Any) -> MPCSettings:
+        """The paper's controller with the numbers of the code that it uses, with `changes` by name.
+
+        The paper gives neither gamma nor weights. The public code of Zeng, Zhang and Sreenath has Q = 10 I,
+        R = I, P = 100 I and gamma = 0.4: its weights of velocities are ten times those of `paper`. That
+        code also has dt = 0.2 s and limits of each axis; here they are the paper's.
+
+        Examples
+        --------
+        >>> import szlib
+        >>> settings = szlib.MPCSettings.reference_code()
+        >>> settings.Q, settings.badges()["Q"]
+        ((10.0, 10.0, 10.0, 10.0), 'reference code')
+        """
+        return cls.paper(**_CODE | changes)
+
     @property
     def gamma_rate(self) -> float:
         """The rate at which h may fall, whatever dt is: h(t) >= h(0) exp(-gamma_rate t) [1/s]."""
@@ -263,7 +287,8 @@ class MPCSettings:
     def badges(self) -> dict[str, str]:
         """The source of each value, by name.
 
-        "paper", "assumed", "measured", "tuned" (on the paper's four scenarios), or "chosen" by the user.
+        "paper", "assumed", "measured", "tuned" (on the paper's four scenarios), "reference code" (see
+        `reference_code`), or "chosen" by the user.
         """
         return {each.name: self._find_source(each.name) for each in fields(self)}
 
@@ -271,5 +296,6 @@ class MPCSettings:
         value = getattr(self, name)
         if value == _PAPER.get(name):
             return "paper"
-        is_default = value == getattr(MPCSettings, name)
-        return _SOURCES.get(name, "paper") if is_default else "chosen"
+        if value == getattr(MPCSettings, name):
+            return _SOURCES.get(name, "paper")
+        return "reference code" if value == _CODE.get(name) else "chosen"

@@ -59,8 +59,8 @@ def reference_zone(name: str) -> ReferenceZone:
     ----------
     name : "atc-strangers" (a day of the ATC mall, Osaka: a circle, because too few people met for more),
         "grand-central-strangers" (Grand Central, New York), "pooled-strangers" (a circle with the mean radius
-        of both sites), "atc-paper" and "atc-paper-strangers" (the same day by the paper's method, of everybody
-        and of strangers), or "hall" (a circle: Hall's personal distance).
+        of both sites), "atc-paper" and "atc-paper-strangers" (that ATC day by the paper's method, all and
+        strangers), or "hall" (a circle: Hall's personal distance).
 
     Raises
     ------
