@@ -211,7 +211,9 @@ record.check(
 # Checks
 plain_lof = LocalOutlierFactor(n_neighbors=20, contamination=fraction)
 differ = int(((plain_lof.fit_predict(points) == -1) != outlier).sum())
-record.check("the quota removes what scikit-learn's LOF with 20 neighbours removes", not differ, f"{differ} differ")
+record.check(
+    "the quota removes what scikit-learn's LOF with 20 neighbours removes", not differ, f"{differ} differ"
+)
 plain_outlier = plain_lof.fit_predict(plain) == -1
 rim, rim_plain = int((r[outlier] < 1).sum()), int((r[plain_outlier] < 1).sum())
 record.claim(
@@ -333,7 +335,7 @@ kept = outliers.nearest_approaches(people[~whole])
 left = outliers.complementary_points(kept, r_max=r_max)
 factors = -LocalOutlierFactor(n_neighbors=max(20, -(-len(left) // 50))).fit(left).negative_outlier_factor_
 is_near = (kept["distance"] < kept["distance"].median()).to_numpy()
-what = "of the near encounters that are kept none has an LOF above 2, and of the removed ones each had"
+what = "no near encounter that is kept has an LOF above 2, and most of the removed ones had one"
 first = nearest["encounter"].isin(people.loc[whole, "encounter"]).to_numpy()
 is_limit = factors[is_near].max() <= 2 < np.sort(factor[first])[first.sum() // 2]
 record.check(what, is_limit, f"largest {factors[is_near].max():.2f}")

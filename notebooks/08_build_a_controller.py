@@ -621,7 +621,8 @@ for name, scene in szlib.SCENARIOS.items():
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# Later: a dear velocity makes the robot slow. Notebook 28 asks which claims of the paper depend on these numbers.
+# Later: a dear velocity makes the robot slow. Which claims of the paper depend on these numbers? See notebook
+# [28](deeper/28_sentences.ipynb).
 #
 # </details>
 #

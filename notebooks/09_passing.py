@@ -31,7 +31,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [08](08_build_a_controller.ipynb) · next: [10 - Meeting in a narrow
-# corridor](10_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6a · 25 min · needs
+# corridor](10_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6a · 30 min · needs
 # [07](07_barriers.ipynb) · exercises: [7.1](exercises/sheet7_robot.ipynb#7.1-gamma-by-experiment-(40-min))
 # · laboratory: [13](13_laboratory.ipynb)
 #

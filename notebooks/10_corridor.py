@@ -119,6 +119,9 @@ movie
 # %% jupyter={"source_hidden": true}
 # Checks
 scenario_runs.record_safety(record, runs)
+
+# %% jupyter={"source_hidden": true}
+# Checks: eq. 1 in each step
 spare = log.h[1:] - (1 - gamma) * log.h[:-1]  # eq. 1 of each row and each step
 what = f"in each step h of the person falls by {gamma:.0%} at most, and comes to that limit"
 is_limit = -1e-6 < spare[:, 0].min() < 1e-3 if record.cache.is_synthetic else spare[:, 0].min() > -1e-6

@@ -16,7 +16,6 @@ import numpy as np
 import pandas as pd
 from studies.committed import study, write_table
 from studies.distances import euclidean_to_ellipse, euclidean_to_segment
-from studies.rollout_table import interval
 
 import szlib
 from szlib.control.differential_drive import Unicycle
@@ -26,6 +25,7 @@ from szlib.core.checks import Array
 from szlib.simulation.baseline_controllers import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.monte_carlo import RolloutSetup
 from szlib.simulation.scenario import GOAL_RADIUS, ONE_PERSON, Worlds
+from szlib.workbook.claims import find_interval
 from szlib.zones.ellipses import BODY_RADIUS
 
 TABLE = "29_differential"
@@ -128,12 +128,12 @@ def line(rows: pd.DataFrame, against: pd.DataFrame) -> dict[str, Any]:
     later = (rows["time_to_goal"] - against["time_to_goal"])[both].to_numpy()
     drawn = np.random.default_rng(0).choice(later, (2000, len(later))).mean(axis=1)
     broken = int((rows["unflagged_violations"] > 0).sum())
-    low, high = interval(arrived, n)
+    low, high = find_interval(arrived, n)
     return {
         "worlds": n,
         "steps": int(rows["steps"].sum()),
         "unflagged h < 0, steps": int(rows["unflagged_violations"].sum()),
-        "worlds with one, high 95 %": interval(broken, n)[1],
+        "worlds with one, high 95 %": find_interval(broken, n)[1],
         **{f"unflagged fine {g} < 0, steps": int(rows[f"fine_{g}_broken"].sum()) for g in GAPS},
         **{f"least fine {g} [m]": float(rows[f"fine_{g}"].min()) for g in GAPS},
         "flagged steps": int(rows["flagged_steps"].sum()),

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from studies.committed import study, write_table
-from studies.rollout_table import interval
 
 import szlib
 from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import rollouts
+from szlib.workbook.claims import find_interval
 
 TABLE = "09_gamma"
 SEED = 1_000_000
@@ -37,11 +37,11 @@ def summarise(gamma: float, rows: pd.DataFrame) -> dict[str, Any]:
     n, arrived = len(rows), int(rows["success"].sum())
     entered = int((rows["min_h"] < -TOLERANCE).sum())
     line: dict[str, Any] = {"gamma": gamma, "worlds": n, "arrived": arrived / n}
-    line["arrived, low"], line["arrived, high"] = interval(arrived, n)
+    line["arrived, low"], line["arrived, high"] = find_interval(arrived, n)
     line["worlds with an infeasible step"] = int((rows["infeasible_steps"] > 0).sum())
     line["infeasible steps"] = int(rows["infeasible_steps"].sum())
     line["worlds with h < 0"] = entered
-    line["h < 0, low"], line["h < 0, high"] = interval(entered, n)
+    line["h < 0, low"], line["h < 0, high"] = find_interval(entered, n)
     line["median time to goal [s]"] = float(rows["time_to_goal"].median())
     return line
 

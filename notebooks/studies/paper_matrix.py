@@ -272,7 +272,9 @@ def list_robots(zones: pd.DataFrame, jobs: int) -> Iterator[dict[str, Any]]:
 
 CHAIN_CLAIMS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
     "The zone is larger in front of the person.": lambda zone: zone["center_x"] > 0,
-    "The zone grows with the speed.": lambda zone: zone["area_fast"] > zone["area_slow"],
+    "The zone grows with the speed (ours, not the paper's).": lambda zone: (
+        zone["area_fast"] > zone["area_slow"]
+    ),
     "Most of what LOF removes are outliers.": lambda zone: zone["intruders_removed"] > 0.5,
     "Complementary distances spare the edge.": lambda zone: zone["edge_removed"] < zone["edge_removed_plain"],
 }
@@ -298,8 +300,9 @@ CELL = ["claim", "scenario", "source", "condition"]
 
 
 def count(rows: pd.DataFrame) -> pd.DataFrame:
-    """One line a cell: draws, those in which the claim holds, the first draw, and whether it holds there."""
-    cells = rows.sort_values("draw").groupby(CELL, sort=False)
+    """One line a cell of `rows` in the order of draws: how many, in how many the claim holds, the first draw, and
+    whether it holds there."""
+    cells = rows.groupby(CELL, sort=False)
     found = cells["holds"].agg(draws="size", held="sum", probe="first").astype(int)
     found["draw"] = cells["draw"].first()
     found = found.reset_index()
@@ -339,7 +342,8 @@ def draw_matrix(matrix: pd.DataFrame) -> Figure:
         right.set_title(title, fontsize=10)
         right.set_yticks([])
     panels[0, 1].axvline(len(ROBOTS) - 0.5, color="black", linewidth=2)
-    figure.suptitle("Share of zones in which each claim of the paper holds [%]")
+    title = "gamma decides whether the robot is safe, the place whether the zone is larger in front"
+    figure.suptitle(f"{title}\n(share of zones in which each claim holds, in %)")
     return figure
 
 

@@ -14,7 +14,6 @@ from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
-from scipy.stats import beta
 from studies.committed import study, write_table
 
 import szlib
@@ -22,6 +21,7 @@ from szlib.control.settings import TOLERANCE
 from szlib.simulation.metrics import Outcome
 from szlib.simulation.monte_carlo import RolloutSetup, rollouts
 from szlib.simulation.scenario import ONE_PERSON, Worlds
+from szlib.workbook.claims import find_interval
 
 TABLE = "21_rollouts"
 APART = 1_000_000
@@ -48,13 +48,6 @@ SETS: dict[str, tuple[Worlds, tuple[str, ...]]] = {
 """Worlds, and the formulations that drive in them."""
 EVENTS = {"h < 0": "min_h", "overlap wall": "min_clearance_walls", "overlap person": "min_clearance_people"}
 """What may happen in a world, and the column that is negative then."""
-
-
-def interval(count: int, n: int, level: float = 0.95) -> tuple[float, float]:
-    """Clopper-Pearson: the shares under which `count` of `n` or fewer, or more, is not too unlikely."""
-    tail = (1 - level) / 2
-    low = float(beta.ppf(tail, count, n - count + 1)) if count else 0.0
-    return low, float(beta.ppf(1 - tail, count + 1, n - count)) if count < n else 1.0
 
 
 def summarise_rollouts(rows: pd.DataFrame) -> dict[str, Any]:
@@ -87,7 +80,7 @@ def row(blocks: list[pd.DataFrame]) -> dict[str, Any]:
     for event, column in EVENTS.items():
         happened = [int((block[column] < -TOLERANCE).sum()) for block in blocks]
         line[f"worlds {event}"] = sum(happened)
-        line[f"low {event}"], line[f"high {event}"] = interval(sum(happened), len(rows))
+        line[f"low {event}"], line[f"high {event}"] = find_interval(sum(happened), len(rows))
         line[f"blocks {event}"] = " ".join(map(str, happened))
     line["largest solve_time [s]"] = float(rows["solve_time_max"].max())
     return line

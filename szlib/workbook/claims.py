@@ -43,8 +43,8 @@ _FIXED = {"untestable": "untestable here", "open": "not done here"}
 _TESTS = "tests/"  # begins the name of a test, which a run does not execute
 
 
-def find_interval(count: float, n: int, level: float = 0.95) -> tuple[float, float]:
-    """The interval of a share by Clopper and Pearson, of `count` of `n` trials; `count` may be a fraction.
+def find_interval(count: float, n: int) -> tuple[float, float]:
+    """The 95 % interval of a share, `count` of `n` trials (Clopper and Pearson); `count` may be a fraction.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def find_interval(count: float, n: int, level: float = 0.95) -> tuple[float, flo
     [0.912, 1.0]
     """
     require(0 <= count <= n and n > 0, "count", count, f"0 to n = {n}, with n > 0")
-    tail = (1 - level) / 2
+    tail = 0.025
     low = float(beta.ppf(tail, count, n - count + 1)) if count > 0 else 0.0
     high = float(beta.ppf(1 - tail, count + 1, n - count)) if count < n else 1.0
     return low, high
@@ -133,10 +133,9 @@ def _find_deciding_factor(cells: pd.DataFrame) -> str:
         levels = cells.groupby(factor, sort=False)[["held", "draws"]].sum()
         shares = levels["held"] / levels["draws"]
         worst, best = shares.idxmin(), shares.idxmax()
-        text = (
-            f"{factor}: {shares.min():.0%} with {worst}, {shares.max():.0%} with {best}"
-        )
-        found[text.replace("%", " %")] = float(shares.max() - shares.min())
+        low, high = (f"{100 * share:.0f} %" for share in (shares.min(), shares.max()))
+        text = f"{factor}: {low} with {worst}, {high} with {best}"
+        found[text] = float(shares.max() - shares.min())
     text = max(found, key=lambda each: found[each])
     return text if found[text] >= DECISIVE else ""
 

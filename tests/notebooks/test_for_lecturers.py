@@ -60,6 +60,18 @@ def test_each_week_has_goals_misconceptions_of_each_chapter_and_questions(week):
 
 
 @pytest.mark.parametrize("week", WEEKS, ids=lambda week: week[0])
+def test_a_misconception_is_corrected_in_a_section_that_exists(week):
+    rows = re.findall(
+        r"^\| (?!\d)[^|]+ \| [^|]+ \| (\d\d), ([^|;]+?)(?:;[^|]*)? \|$", week[2], re.M
+    )
+    sources = {page.number: page.source for page in course.pages()}
+    for number, section in rows:
+        text = sources[number].read_text(encoding="utf-8")
+        headings = [each.lower() for each in re.findall(r"^# ##+ (.+)$", text, re.M)]
+        assert section in headings, f"{number}, {section}"
+
+
+@pytest.mark.parametrize("week", WEEKS, ids=lambda week: week[0])
 def test_each_week_has_a_plan_of_90_minutes(week):
     """Minutes follow each other; a scene is a section of a chapter of the week, a task or the project."""
     number, _, text = week

@@ -11,6 +11,7 @@ from studies import real_day
 from szlib.workbook import folders
 
 COPIES = sorted((folders.NOTEBOOKS / "real_day").glob("*.ipynb"))
+SCRIPTS = {script.stem: script for script in folders.list_notebooks()}
 
 
 def _refresh():
@@ -29,7 +30,7 @@ refresh = _refresh()
 class TestCopy:
     def test_copy_has_the_cells_of_the_notebook(self, copy):
         executed = nbformat.read(copy, as_version=4)
-        now = refresh.replace_data(folders.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
+        now = refresh.replace_data(SCRIPTS[copy.stem], "atc-1hz")
         again = "python notebooks/tools/refresh.py real_day"
         assert [c.source for c in executed.cells] == [c.source for c in now.cells], (
             again
@@ -109,7 +110,7 @@ def test_number_that_cannot_be_read_back_is_an_error(numbers):
 
 def test_copies_on_the_real_day_show_the_numbers_of_the_plaza_copies():
     for copy in COPIES:
-        numbers = real_day.read_numbers(folders.NOTEBOOKS / copy.name)
+        numbers = real_day.read_numbers(SCRIPTS[copy.stem].with_suffix(".ipynb"))
         cells = nbformat.read(copy, as_version=4).cells
         texts = [
             o.get("data", {}).get("text/markdown", "")
