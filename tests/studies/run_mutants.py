@@ -3,8 +3,8 @@
     python tests/studies/run_mutants.py [--jobs 2] [--only TEXT]
 
 Each mutant of run_mutants.toml is one change of the package. It is made in a copy of the repository, and
-`szlib run` executes the chapters of its part there. A mutant is noticed if the run fails. Prints each, and the
-share; the copy is thrown away. Half an hour on two cores.
+`szlib run` executes the chapters of its part there. A mutant is noticed if the run fails. It prints each and
+the share; the copy is thrown away. Half an hour on two cores.
 """
 
 from __future__ import annotations
