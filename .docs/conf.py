@@ -154,10 +154,10 @@ def copy_notebook(source, target):
 
 
 def make_bibtex():
-    """The entries of CITATION.cff for BibTeX: the paper, szlib, and the data."""
+    """The entries of CITATION.cff for BibTeX: szlib, the paper, and the data."""
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     text = ""
-    for work in [citation["preferred-citation"], citation, *citation["references"]]:
+    for work in [citation, *citation["references"]]:
         kind = {"article": "article", "conference-paper": "inproceedings"}.get(
             work["type"], "misc"
         )

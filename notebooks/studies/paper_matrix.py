@@ -55,8 +55,9 @@ SOURCES = {
     PLAZAS: ("plaza", None),
 }
 """Site and kind of people of each source of zones."""
+PAPERS = "the paper's"
 CHAINS: dict[str, dict[str, Any]] = {
-    "the paper's": {},
+    PAPERS: {},
     "no outliers removed": {"fraction": 0.0},
     "0.1 % removed": {"fraction": 0.001},
     "0.4 % removed": {"fraction": 0.004},
@@ -70,7 +71,7 @@ SPEEDS = (0.7, 1.1, 1.3)
 PAPER = szlib.MPCSettings.paper()
 BASE = replace(PAPER, solver="sqp")
 ROBOTS = {
-    "the paper's": PAPER,
+    PAPERS: PAPER,
     **{f"gamma = {gamma:g}": replace(BASE, gamma=gamma) for gamma in (0.02, 0.1, 0.2, 0.4)},
     **{f"N_h = {n}": replace(BASE, N_h=n) for n in (1, 4, 8)},
     "weights of its code": szlib.MPCSettings.reference_code(solver="sqp", gamma=BASE.gamma),
@@ -153,7 +154,7 @@ def judge_outliers(samples: pd.DataFrame, chain: str, seed: int) -> dict[str, fl
     near = (close["distance"] < 1.0).to_numpy()
     as_many = factors >= np.sort(factors)[-removed.sum()]
     return {
-        "intruders_removed": float(intruder[removed].mean()),
+        "intruders_removed": round(float(intruder[removed].mean()), 3),
         "edge_removed": float(near[removed & ~intruder].sum()),
         "edge_removed_plain": float(near[as_many & ~intruder].sum()),
     }
@@ -166,14 +167,21 @@ def list_zones(source: str, draws: Sequence[int]) -> Iterator[dict[str, Any]]:
         samples = read_source(source, draw) if is_plaza else draw_people(read_source(source), draw)
         for chain in CHAINS:
             row: dict[str, Any] = {"source": source, "draw": draw, "chain": chain}
-            row |= fit_chain(samples, chain)
+            row |= shorten(fit_chain(samples, chain), chain)
             yield row | (judge_outliers(samples, chain, draw) if is_plaza else {})
+
+
+def shorten(zone: dict[str, float], chain: str) -> dict[str, float]:
+    """What a table needs of a `zone`: all of the paper's, for the robots, and of others what claims are about."""
+    if chain == PAPERS:
+        return zone
+    return {name: round(zone[name], 3) for name in ("center_x", "a", "area_slow", "area_fast")}
 
 
 @study("28_zones", notebook="28")
 def recompute_zone(row: pd.Series) -> dict[str, float]:
     """The zone of a plaza, again."""
-    return fit_chain(read_source(PLAZAS, int(row["draw"])), row["chain"])
+    return shorten(fit_chain(read_source(PLAZAS, int(row["draw"])), row["chain"]), row["chain"])
 
 
 # --- robots ------------------------------------------------------------------------------------------
@@ -260,7 +268,7 @@ def judge_row(source: str, draw: int, zone: szlib.Ellipse) -> list[dict[str, Any
 def list_robots(zones: pd.DataFrame, jobs: int) -> Iterator[dict[str, Any]]:
     """The claims about robots, in each of the `zones` by the paper's chain."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    papers = zones.query('chain == "the paper\'s"').dropna(subset=["a"]).sort_values("draw")
+    papers = zones.query('chain == "the paper\'s"').dropna(subset=["a"]).sort_values(["draw", "source"])
     found = [(row["source"], row["draw"], read_zone(row)) for _, row in papers.iterrows()]
     tasks = [joblib.delayed(judge_row)(*each) for each in found]
     for rows in run_tasks(tasks, n_jobs=jobs):

@@ -69,14 +69,14 @@ def refresh(source: Path, data: str = "") -> None:
     jupytext.write(notebook, target, fmt="ipynb")
 
 
-def copy_picture(figure: Path, name: str) -> None:
+def copy_picture(figure: Path, name: str, colours: int = 128) -> None:
     """Copy a `figure` of the last run to the pictures of the README, with fewer colours, so that it is small."""
     target = HERE / "figures" / name
     target.parent.mkdir(exist_ok=True)
     if figure.suffix == ".gif":
         shutil.copyfile(figure, target)
     else:
-        few = Image.open(figure).convert("RGB").quantize(128, Image.Quantize.MAXCOVERAGE, kmeans=1)
+        few = Image.open(figure).convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE, kmeans=1)
         few.save(target, optimize=True)
 
 
@@ -86,7 +86,7 @@ def main(names: list[str]) -> None:
             if any(folders.has_name(source, name) for name in names[1:] or REAL_DAY):
                 print(source.stem, flush=True)
                 refresh(source, "atc-1hz")
-        copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png")
+        copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png", colours=32)
         return
     for source in chain(*runner.split_batches(folders.list_notebooks())):
         if not names or any(folders.has_name(source, name) for name in names):

