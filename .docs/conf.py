@@ -154,10 +154,10 @@ def copy_notebook(source, target):
 
 
 def make_bibtex():
-    """The entries of CITATION.cff for BibTeX: the paper, szlib, and the data."""
+    """The entries of CITATION.cff for BibTeX: szlib, the paper, and the data."""
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     text = ""
-    for work in [citation["preferred-citation"], citation, *citation["references"]]:
+    for work in [citation["preferred-citation"], *citation["references"]]:
         kind = {"article": "article", "conference-paper": "inproceedings"}.get(
             work["type"], "misc"
         )
@@ -170,17 +170,14 @@ def make_bibtex():
         first = unicodedata.normalize(
             "NFKD", work["authors"][0].get("family-names", "szlib")
         )
-        year = work.get("year") or work["date-released"].year
         fields = {
             "author": " and ".join(people),
             "title": f"{{{work['title']}}}",
-            "year": year,
+            "year": work["year"],
         }
         fields |= {field: work[key] for key, field in FIELDS.items() if key in work}
         lines = "".join(f"  {name} = {{{value}}},\n" for name, value in fields.items())
-        text += (
-            f"@{kind}{{{first.encode('ascii', 'ignore').decode()}{year},\n{lines}}}\n\n"
-        )
+        text += f"@{kind}{{{first.encode('ascii', 'ignore').decode()}{work['year']},\n{lines}}}\n\n"
     return text
 
 
