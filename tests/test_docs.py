@@ -176,6 +176,28 @@ def test_the_five_results_are_those_of_the_tables():
         in text
     )
 
+    cells = table("28_matrix").set_index(["claim", "source", "condition"]).sort_index()
+    in_front = cells.loc[
+        (
+            "The zone is larger in front of the person.",
+            "ATC day, everybody",
+            "the paper's",
+        )
+    ]
+    held, draws = (int(in_front[name].sum()) for name in ("held", "draws"))
+    assert f"in {held} of {draws} zones of that day" in text
+    stays = cells.loc["The robot remains within the safety set."].reset_index()
+    papers, code = (
+        stays[stays["condition"] == name]
+        for name in ("the paper's", "weights and gamma of its code")
+    )
+    zones = papers.groupby("source")["draws"].max().sum()
+    assert (papers["held"] == papers["draws"]).all() and code["held"].sum() == 0
+    assert (
+        f"keeps out of all {zones} zones; with its code's gamma of 0.4, out of none"
+        in text
+    )
+
     rule = table("03_outliers").query(
         "intruders == 0.0025 and rule == '0.2 %, 20 neighbours'"
     )

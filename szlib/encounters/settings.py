@@ -88,7 +88,11 @@ class EncounterSettings:
     def paper(cls, area: object = None) -> EncounterSettings:
         """The four conditions of the paper (sec. 2) in an `area`, whose coordinates the paper does not give.
 
-        They are the defaults: a space of 4 m x 5 m ahead, windows of 3 s, 1 m, 0.4 m/s.
+        They are the defaults: a space of 4 m x 5 m ahead, windows of 3 s, 1 m, 0.4 m/s. Condition 2, "only
+        one other pedestrian is present in this space for a duration of 3 seconds", is read loosely: that
+        person is inside when the window opens, and nobody else is inside at any time. The strict reading,
+        inside `throughout`, never sees anybody behind, although the paper's people pass each other: on the
+        ATC day it finds 139 encounters instead of 252, and no zone that is closed behind.
         """
         return cls(
             area=area, space=PAPER_SPACE, duration=3.0, min_distance=1.0, min_speed=0.4

@@ -135,6 +135,8 @@ class Recipe:
             )
         if {"t", "frame"} <= set(self.columns or ()):
             raise DataError("columns: both t and frame are given; expected one of them")
+        is_text = self.where is None or isinstance(self.where, str)
+        require(is_text, "where", self.where, "a condition in SQL, as text")
         _check_zone(self.tz)
 
     @property

@@ -251,6 +251,10 @@ def metres_in_degree(latitude: float) -> tuple[float, float]:
     return float(np.radians(1) * east), float(np.radians(1) * north)
 
 
+# What a recipe may say that a scan of rows cannot do: the file is then read as a whole.
+_NOT_STREAMED = {"where", "homography", "origin", "frame_rate", "time_unit"}
+
+
 def scan_streamed(
     plain: Path, path: Path, recipe: Recipe
 ) -> tuple[Recipe, pl.LazyFrame] | None:
@@ -260,7 +264,8 @@ def scan_streamed(
     """
     head = read_head(plain)
     shape = recognise(head, path, recipe)
-    if not shape.is_streamed or head.startswith(tuple(_CONTAINERS)):
+    is_plain = not _NOT_STREAMED & recipe.as_json().keys()
+    if not (shape.is_streamed and is_plain) or head.startswith(tuple(_CONTAINERS)):
         return None
     recipe = replace(recipe.over(shape.recipe), file_format=shape.name)
     n, columns = shape.n_fields, recipe.columns or {}

@@ -314,3 +314,39 @@ def test_memory_is_charged_by_decoded_bytes(tmp_path: Path) -> None:
             pytest.raises(MemoryLimitError, match="MB of a column"),
         ):
             read_raw(tmp_path / name)
+
+
+# --- a raw day whose recipe says more than a scan of its rows can do ----------------------------------
+
+
+def write_raw_day(folder: Path) -> Path:
+    """Two people, who walk along x at y = 1 and 2 m, in the format of the ATC days."""
+    rows = [
+        f"{1351038000 + 0.04 * k:.3f},{7 + i},{-15000 + 40 * k},{1000 + 1000 * i},1200,1000,0.1,0.1"
+        for k in range(100)
+        for i in range(2)
+    ]
+    file = folder / "atc-20121024.csv"
+    file.write_text("\n".join(rows) + "\n")
+    return file
+
+
+def test_a_condition_chooses_rows_of_a_raw_day_too(tmp_path):
+    file = write_raw_day(tmp_path)
+    both = szlib.read_tracks(file)
+    one = szlib.read_tracks(file, recipe=szlib.Recipe(where="f1 = '8'"))
+    assert set(both["id"]) == {7, 8}
+    assert one["y"].unique() == pytest.approx([2.0]) and 2 * len(one) == len(both)
+
+
+def test_a_homography_maps_a_raw_day_too(tmp_path):
+    file = write_raw_day(tmp_path)
+    swapped = [[0, 0.001, 0], [0.001, 0, 0], [0, 0, 1]]
+    plain = szlib.read_tracks(file)
+    mapped = szlib.read_tracks(file, recipe=szlib.Recipe(homography=swapped))
+    assert mapped[["y", "x"]].to_numpy() == pytest.approx(plain[["x", "y"]].to_numpy())
+
+
+def test_a_condition_that_is_no_text_is_refused():
+    with pytest.raises(szlib.DataError, match="where must be a condition in SQL"):
+        szlib.Recipe(where=("id", "8"))

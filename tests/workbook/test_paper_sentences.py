@@ -2,6 +2,8 @@
 
 import importlib
 import json
+import os
+import re
 from functools import cache
 from pathlib import Path
 
@@ -47,6 +49,30 @@ def test_rows_are_complete_and_hold_no_verdict():
         assert 0 < len(row["sentence"].split()) <= 25, row
         assert row["held_by"] or row["kind"] == "untestable", row
         assert row["how"] or row["kind"] in {"implemented", "claim", "stress"}, row
+
+
+def plain(text: str) -> str:
+    """Words of LaTeX or of a quotation, without commands, citations and punctuation."""
+    text = re.sub(r"\\cite[pt]?\{[^}]*\}|~?\\ref\{[^}]*\}", "", text)
+    text = re.sub(r"\\(jwc|textbf|textcolor\{black\}|mbox)\{", " ", text)
+    text = re.sub(r"[$\\{}~,;:.\u2019'%]", " ", text.replace("---", " - "))
+    return " ".join(text.lower().split())
+
+
+@pytest.mark.skipif(
+    "SZLIB_PAPER" not in os.environ,
+    reason="the paper is not shipped: name its LaTeX file in $SZLIB_PAPER",
+)
+def test_sentences_are_quotations_of_the_paper():
+    paper = plain(Path(os.environ["SZLIB_PAPER"]).read_text(encoding="utf-8"))
+    missing = [
+        row["sentence"]
+        for row in SENTENCES
+        if "eq." not in row["place"] and row["kind"] != "stress"
+        for part in row["sentence"].split("...")
+        if plain(part) not in paper
+    ]
+    assert missing == []
 
 
 def test_code_of_every_sentence_can_be_imported():
