@@ -157,7 +157,7 @@ def make_bibtex():
     """The entries of CITATION.cff for BibTeX: szlib, the paper, and the data."""
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     text = ""
-    for work in [citation["preferred-citation"], *citation["references"]]:
+    for work in [citation, *citation["references"]]:
         kind = {"article": "article", "conference-paper": "inproceedings"}.get(
             work["type"], "misc"
         )
@@ -170,14 +170,17 @@ def make_bibtex():
         first = unicodedata.normalize(
             "NFKD", work["authors"][0].get("family-names", "szlib")
         )
+        year = work.get("year") or work["date-released"].year
         fields = {
             "author": " and ".join(people),
             "title": f"{{{work['title']}}}",
-            "year": work["year"],
+            "year": year,
         }
         fields |= {field: work[key] for key, field in FIELDS.items() if key in work}
         lines = "".join(f"  {name} = {{{value}}},\n" for name, value in fields.items())
-        text += f"@{kind}{{{first.encode('ascii', 'ignore').decode()}{work['year']},\n{lines}}}\n\n"
+        text += (
+            f"@{kind}{{{first.encode('ascii', 'ignore').decode()}{year},\n{lines}}}\n\n"
+        )
     return text
 
 
