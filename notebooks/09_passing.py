@@ -157,7 +157,7 @@ for each in (gamma, 0.4):
 # The answer
 Markdown(
     f"<details><summary>Answer</summary>\n\nAs fitted, the paper's zone is passed on the {sides['as fitted']}; mirrored, on the "
-    f"{sides['mirrored']}. Before the symmetric zone the robot slows down to {slowest:.2f} m/s, and leaves the straight line only when "
+    f"{sides['mirrored']}. The paper's zone of the ATC day is passed on the {runs.atc.metrics()['passing_side']}. Before the symmetric zone the robot slows down to {slowest:.2f} m/s, and leaves the straight line only when "
     "rounding errors have grown. So the side is no property of the paper's formulation. Its abstract says: on the right."
     "\n\n</details>"
 )
