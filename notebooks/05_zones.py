@@ -200,6 +200,9 @@ ok = off < 1e-9 and (np.isnan(by_hand) == np.isnan(library)).mean() > 0.9
 record.check(
     "on smoothed paths the ten lines give the library's radii", ok, f"largest difference {1000 * off:.1f} mm"
 )
+before = samples["distance"] * np.exp(1j * samples["los_angle"])  # as complex numbers
+moved = float(np.abs(distance * np.exp(1j * angle) - before).mean())
+record.check("smoothing moves a position by less than 10 cm", moved < 0.1, f"{100 * moved:.1f} cm on average")
 noise = np.random.default_rng(seed).normal(0, 0.05, (10_000, 30)).min(axis=1).mean()
 Markdown(
     f"""<details><summary>Answer</summary>
