@@ -7,10 +7,13 @@ import pandas as pd
 import pytest
 from studies import paper_matrix
 from studies.atlas import REFERENCE
+from studies.plaza_truth import true_kinds
 
 import szlib
+from szlib.plaza import accuracy
 from szlib.workbook.claims import judge_claims
 from szlib.workbook.record import read_table
+from szlib.zones import outliers
 from szlib.zones.outliers import pair_numbers
 
 ZONES, MATRIX = read_table("28_zones"), read_table("28_matrix")
@@ -112,3 +115,17 @@ def test_the_papers_robot_stays_safe_and_the_gamma_of_its_code_does_not():
     share = sums["held"] / sums["draws"]
     assert share["the paper's"] == share["weights of its code"] == 1.0
     assert share["weights and gamma of its code"] == 0.0
+
+
+def test_outliers_of_a_plaza_are_judged_by_its_truth():
+    samples = paper_matrix.read_source(paper_matrix.PLAZAS, 3)
+    close = samples[samples["distance"] <= 2.0]
+    removed = outliers.is_outlier(close, fraction=0.002, n_neighbours=20)
+    truth = true_kinds(close, seed=3) == "intruder"
+    found = paper_matrix.judge_outliers(samples, "the paper's", 3)
+    precision = accuracy.precision_and_recall(removed, truth)[0]
+    assert found["intruders_removed"] == pytest.approx(precision, abs=5e-4)
+    near = (close["distance"] < 1.0).to_numpy()
+    assert found["edge_removed"] == (removed & near & ~truth).sum()
+    assert 0 < found["edge_removed_plain"] <= removed.sum()
+    assert paper_matrix.judge_outliers(samples, "no outliers removed", 3) == {}
