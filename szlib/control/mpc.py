@@ -420,7 +420,7 @@ class MPCCBF(Controller):
         elif bodies.size:
             places = bodies.groups[0].numbers[:, :2]
             towards = ((places - begin) @ (path.points - begin).T).max(axis=1)
-            overlaps = bodies.gaps(*begin) + spare < 0.0
+            overlaps = bodies.gaps(*begin) + spare < -TOLERANCE
             parting = np.where(towards > 0, -towards, inf) - spare
             of_bodies = [np.where(overlaps, parting, each) for each in of_bodies]
         found = wall, of_bodies[0], wall_seen, of_bodies[1]
