@@ -16,7 +16,7 @@ because people enter neither the condition nor the braking (`Step.walls_safe`).
 
 *Bodies.* A control is passively safe if, with people who keep their velocity, the robot overlaps no body
 while it moves: if it brakes after dt, or if it follows its plan to the end and brakes there. It must not
-move towards a body that it overlaps already, by more than the curve within a step. If the plan is not
+move towards a body that it overlaps already, by more than the curve within a step of the plan. If it is not
 passively safe and braking is better, the robot brakes. So it is at rest when somebody walks into it, if
 people keep their velocity and it could be (`Step.passively_safe`; passive safety: Macek et al., ECMR 2009).
 Walls go first: braking is safe for them.

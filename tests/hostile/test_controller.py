@@ -33,12 +33,13 @@ def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
     assert tally["worlds"] == 5
 
 
-@pytest.mark.parametrize(("island", "place"), [(119, 3), (142, 5)])
+@pytest.mark.parametrize(("island", "place"), [(119, 3), (142, 5), (223, 25)])
 def test_a_world_that_once_broke_a_claim_breaks_none(island, place):
     """In the first one a robot that creeps at 1.05 mm/s was said to rest.
 
     In the second one somebody touches the robot to 2 nm: that was an overlap to the controller, and none to
-    `Step.verify`.
+    `Step.verify`. In the third one a plan with steps of 0.3 s bends towards a body by more than a step of
+    0.1 s can.
     """
     faults = []
     walls.run_world(walls.find_world(island, place), Counter(), faults.append)

@@ -428,13 +428,17 @@ class Robot:
 
 
 def body_faults(
-    points: Any, speeds: Any, times: Any, step: Any, radius: float
+    points: Any, speeds: Any, times: Any, step: Any, radius: float, longest: int = 1
 ) -> Iterator[str]:
-    """How the robot overlaps a known body while it moves, if people keep their velocity."""
+    """How the robot overlaps a known body while it moves, if people keep their velocity.
+
+    `longest` is the number of dt in the longest step of the way: its ends are known to move away from a body
+    that it overlaps, what is between them may bend towards it.
+    """
     is_moving = np.maximum(speeds, np.r_[speeds[1:], 0.0]) > AT_REST
     s = step.scene.settings
     bend = OMEGA_MAX * s.v_max if hasattr(step, "point") else 2**0.5 * s.a_max
-    curve = bend * s.dt**2 / 8 + 1e-5
+    curve = bend * (longest * s.dt) ** 2 / 8 + 1e-5
     for person in step.scene.people:
         centers = np.array(person.position) + times[:, None] * np.array(person.velocity)
         gaps = np.linalg.norm(points - centers, axis=1) - BODY - radius
@@ -513,6 +517,7 @@ def way_faults(step: Any, before: Any, robot: Robot, world: World, s: Any) -> st
                 np.concatenate([*time, now + times]),
                 step,
                 world.radius,
+                max(lengths),
             ),
             "",
         )
