@@ -24,7 +24,7 @@
 # **Question.** Which claims of the paper does the data support?
 #
 # **Expectation.** The paper watched people on 92 days, we have one day. So some claims may stay open. Each is
-# measured with its 95 % interval, and the verdict is "supported", "contradicted" or "not decidable".
+# measured with its 95 % interval, and the verdict is "supported", "not supported" or "not decidable".
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [24](24_data_quality.ipynb) · next: [26 - Eleven
@@ -154,11 +154,10 @@ record.figure(fig, "claims")
 
 # %% jupyter={"source_hidden": true}
 # Checks
-DECIDED = {"supported": True, "contradicted": False}  # other verdicts: not decidable
 record.table(table, "25_claims")
 for each, method in zip(found, methods, strict=True):
     name = each.claim if method == "-" else f"{each.claim} ({method})"
-    record.claim(name, DECIDED.get(each.verdict), str(each))
+    record.claim(name, each.verdict, str(each))
 if record.cache.is_synthetic:
     settings = szlib.PlazaSettings()
     close = samples[samples["distance"] <= r_max]
@@ -179,7 +178,7 @@ if record.cache.is_synthetic:
 of_plaza = "data == 'plaza' and effect == effect"
 everywhere = record.committed_table("25_claims", claims_study.recompute, where=of_plaza)
 answers = claims_study.select_answers(everywhere)
-record.key["claims decided"] = int((~answers["verdict"].str.startswith("not")).sum())
+record.key["claims decided"] = int((~answers["verdict"].str.startswith("not decidable")).sum())
 record.key["cells"] = len(answers)
 listed = answers[answers["n"] > 0].assign(unit=answers["unit"].replace("m2", "m²"))
 fold_table(
@@ -692,9 +691,9 @@ asked = {name for names in paper_sentences.load_sentences()["held_by"] for name 
 for row in everywhere.to_dict("records"):
     where = row["data"] if row["method"] == "-" else f"{row['data']}, {row['method']}"
     if f"{record.name[:2]}: {where}: {row['claim']}" in asked:
-        record.claim(f"{where}: {row['claim']}", DECIDED.get(row["verdict"]), claims.format_finding(row))
+        record.claim(f"{where}: {row['claim']}", row["verdict"], claims.format_finding(row))
 about_zones = answers[answers["claim"].isin(claims_study.CLAIMS)]
-decided = about_zones[~about_zones["verdict"].str.startswith("not")]["data"].value_counts()
+decided = about_zones[~about_zones["verdict"].str.startswith("not decidable")]["data"].value_counts()
 for name, site in {
     "no claim about the zone is decided by the ETH sequence": "ETH",
     "no claim about the zone is decided by Grand Central": "Grand Central",

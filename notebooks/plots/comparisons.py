@@ -46,7 +46,7 @@ _FILLS = (
 )
 
 
-_VERDICTS = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
+_VERDICTS = {"supported": (GREEN, "o"), "not supported": (RED, "X"), "not decidable": (GREY, "s")}
 
 
 def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> Axes:
@@ -286,7 +286,7 @@ def draw_claims(table: pd.DataFrame, *, title: str = "") -> Figure:
     """
     figure, grid = plt.subplots(n := len(table), figsize=(8, 1.1 * n), layout="constrained", squeeze=False)
     for ax, row in zip(grid.flat, table.to_dict("records"), strict=True):
-        colour, marker = _VERDICTS[row["verdict"].split()[0]]
+        colour, marker = _VERDICTS[row["verdict"].partition(" with")[0]]
         ax.hlines(0, row["low"], row["high"], color=colour, linewidth=3)
         ax.plot(row["effect"], 0, marker, color=colour, markersize=9)
         ax.axvline(0, color=BLACK, linewidth=1)

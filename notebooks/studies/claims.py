@@ -257,7 +257,7 @@ def move_zone(name: str, methods: Iterable[str] = tuple(VARIED)) -> Iterator[pd.
 
 VERDICTS = {
     "supported": (figures.GREEN, "o", "full"),
-    "contradicted": (figures.RED, "X", "full"),
+    "not supported": (figures.RED, "X", "full"),
     "not decidable": ("#666666", "s", "none"),
 }
 """Colour, marker and its fill for each verdict."""

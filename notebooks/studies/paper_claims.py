@@ -30,6 +30,7 @@ from szlib.simulation.closed_loop import simulate
 from szlib.simulation.metrics import compute_metrics
 from szlib.simulation.robot_run import Run
 from szlib.simulation.scenario import Claim
+from szlib.workbook.claims import judge_effect
 from szlib.workbook.record import NotebookRecord
 from szlib.zones.ellipses import Ellipse
 from szlib.zones.outliers import R_MAX
@@ -94,12 +95,10 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """ "supported", "contradicted", or "not decidable" with n, and the reason."""
-        if self.adequate and self.low > 0:
-            return "supported"
-        if self.adequate and self.high < 0:
-            return "contradicted"
-        return f"not decidable with n = {self.n:,}" + (f": {self.reason}" if self.reason else "")
+        """That of `judge_effect`; "not decidable" with n, and the reason."""
+        found = judge_effect(self.low, self.high) if self.adequate else "not decidable"
+        because = f": {self.reason}" if self.reason else ""
+        return f"{found} with n = {self.n:,}{because}" if found == "not decidable" else found
 
     def __str__(self) -> str:
         return format_finding(self._row())

@@ -12,7 +12,7 @@ import io
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
@@ -131,14 +131,20 @@ def known_area(
 
 
 def relax_conditions(
-    samples: pd.DataFrame, tracks: pd.DataFrame, settings: EncounterSettings
+    samples: pd.DataFrame,
+    read: Callable[[], pd.DataFrame],
+    settings: EncounterSettings,
 ) -> str:
-    """What relaxing one condition of an encounter would give, where few are found: a sentence.
+    """What relaxing one condition of an encounter would give: a sentence; "" with `FEW_ENCOUNTERS` or more.
 
-    `samples` were found in the `tracks` with the `settings`.  The first condition named costs most.
+    `samples` were found with the `settings` in the tracks that `read` gives.  The first condition named
+    costs most.
     """
-    count, area = samples["encounter"].nunique(), as_area(samples.attrs["area"])
-    settings = replace(settings, area=area)
+    count = samples["encounter"].nunique()
+    if count >= FEW_ENCOUNTERS or "area" not in samples.attrs:
+        return ""
+    tracks = read()
+    settings = replace(settings, area=as_area(samples.attrs["area"]))
     space, half = settings.space, max(settings.steps // 2 / 10, 0.1)
     small = replace(
         space, width=round(space.width / 2, 1), length=round(0.6 * space.length, 1)

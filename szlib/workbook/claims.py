@@ -72,6 +72,13 @@ def judge_share(low: float, high: float, zones: int) -> str:
     return "not decidable" if zones < MIN_ZONES else "depends on the condition"
 
 
+def judge_effect(low: float, high: float) -> str:
+    """The verdict on a claim that an effect is above 0, from the interval `low` to `high` of the effect."""
+    if low > 0:
+        return "supported"
+    return "not supported" if high < 0 else "not decidable"
+
+
 def judge_claims(matrix: pd.DataFrame) -> pd.DataFrame:
     """The verdict on each claim of a `matrix` of claims by condition.
 
@@ -128,16 +135,16 @@ def _find_share(cells: pd.DataFrame) -> float:
 
 
 def _find_deciding_factor(cells: pd.DataFrame) -> str:
-    found = dict[str, float]()
+    found = list[tuple[float, str]]()
     for factor in FACTORS:
         levels = cells.groupby(factor, sort=False)[["held", "draws"]].sum()
         shares = levels["held"] / levels["draws"]
-        worst, best = shares.idxmin(), shares.idxmax()
-        low, high = (f"{100 * share:.0f} %" for share in (shares.min(), shares.max()))
-        text = f"{factor}: {low} with {worst}, {high} with {best}"
-        found[text] = float(shares.max() - shares.min())
-    text = max(found, key=lambda each: found[each])
-    return text if found[text] >= DECISIVE else ""
+        low, high = shares.min(), shares.max()
+        worst = f"{100 * low:.0f} % with {shares.idxmin()}"
+        best = f"{100 * high:.0f} % with {shares.idxmax()}"
+        found.append((high - low, f"{factor}: {worst}, {best}"))
+    difference, text = max(found)
+    return text if difference >= DECISIVE else ""
 
 
 def judge(

@@ -26,6 +26,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,10 +53,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ):  # print escapes where the terminal's encoding lacks a letter
         with suppress(*_BROKEN_STREAM, AttributeError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    given = sys.argv[1:] if arguments is None else arguments
     try:
         with _stop_on_signals(), warnings.catch_warnings():
-            options = build_parser().parse_args(given)
+            options = build_parser().parse_args(arguments)
             size = None if options.memory is None else memory.parse_size(options.memory)
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
             with memory.granted(size):
@@ -86,12 +86,11 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     parser.set_defaults(memory=None)
-    groups = {
-        name: argparse.ArgumentParser(add_help=False) for name in content["groups"]
-    }
-    for name, group in groups.items():
+    groups = dict[str, argparse.ArgumentParser]()
+    for name, each in content["groups"].items():
+        group = groups[name] = argparse.ArgumentParser(add_help=False)
         one = group.add_mutually_exclusive_group() if name == "area" else group
-        _add_arguments(one, content["groups"][name])
+        _add_arguments(one, each)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, each in content["commands"].items():
         parents = [groups[group] for group in each.get("groups", ())]
@@ -125,9 +124,7 @@ def _read_options(options: argparse.Namespace, data: str | Sequence[str]) -> Rec
     is_named = any(name in datasets.NAMES for name in names)
     files = [] if is_named or any(map(os.path.isdir, names)) else datasets.find(names)
     columns: dict[str, str | int] = {}
-    for pair in (
-        pair for text in options.columns for pair in re.split(r",(?=[a-z]+=)", text)
-    ):
+    for pair in filter(None, re.split(r",(?=[a-z]+=)", ",".join(options.columns))):
         name, equals, column = pair.partition("=")
         if not equals or not column:
             raise DataError(
@@ -218,16 +215,11 @@ def _notebooks(options: argparse.Namespace) -> int:
 
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
-    from ..encounters.days import (
-        FEW_ENCOUNTERS,
-        find_encounters_in_files,
-        relax_conditions,
-    )
-    from ..encounters.settings import EncounterSettings
+    from .. import EncounterSettings, read_tracks
+    from ..encounters.days import find_encounters_in_files, relax_conditions
     from ..tracks import datasets, funnels
-    from ..tracks.clock import read_tracks
     from ..tracks.readers import describe_file
-    from ..tracks.recipe import FILE_NAME, arguments
+    from ..tracks.recipe import COMMAND_VARIABLE, FILE_NAME
 
     files = datasets.find([options.file])
     if len(files) != 1:
@@ -235,17 +227,15 @@ def _inspect(options: argparse.Namespace) -> int:
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
     reading = _read_options(options, options.file)
-    advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
+    settings = EncounterSettings(area=options.area, has_walls=options.walls)
     description, found = describe_file(files[0], reading)
     print(description)
     with warnings.catch_warnings(
         action="ignore", category=DataWarning
     ):  # the table shows the same counts
         samples = find_encounters_in_files(files, settings, reading)
-        if "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS:
-            advice = relax_conditions(
-                samples, read_tracks(files, recipe=reading), settings
-            )
+        read = partial(read_tracks, files, recipe=reading)
+        advice = relax_conditions(samples, read, settings)
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
         if samples.attrs["area_reason"]:
@@ -253,25 +243,16 @@ def _inspect(options: argparse.Namespace) -> int:
     print(funnels.text(funnels.get(samples)))
     if advice:
         print(advice)
-    if options.save is None:
-        words = ["run", "--data", options.file]
-        words += ["--walls"] if options.walls else []
-        if isinstance(options.area, list):
-            words += ["--area", *map("{:.12g}".format, options.area)]
-        elif options.area == "auto":
-            words += ["--auto"]
-        elif options.area:
-            words += ["--polygon", options.area]
-        more = arguments(reading.as_json())
-    else:
+    command = f"{os.environ.get(COMMAND_VARIABLE, 'the same command')} --save"
+    if options.save is not None:
         if "area" in samples.attrs:
             found = replace(found, area=samples.attrs["area"])
         file = found.save(options.save or files[0].with_name(FILE_NAME))
         print("recipe saved:", printable(file))
-        words = ["fit", options.file]
-        words += ["--recipe", options.save] if options.save else []
-        more = ""
-    print("go on with:", f"{shlex.join(['szlib', *words])} {more}".strip())
+        words = ["--recipe", options.save] if options.save else []
+        words += ["--walls"] if options.walls else []
+        command = shlex.join(["szlib", "fit", options.file, *words])
+    print("go on with:", command)
     return 0
 
 
@@ -291,21 +272,14 @@ def _extract(options: argparse.Namespace) -> int:
 
 def _fit(options: argparse.Namespace) -> int:
     """Fit a zone to extracted days or tracks."""
-    from ..encounters.settings import EncounterSettings
+    from .. import EncounterSettings
     from .fit_command import fit
 
-    given = {
-        name: getattr(options, name)
-        for name in ("out", "method", "kind", "tracks", "exclude", "jobs")
-    }
+    names = ("out", "method", "kind", "tracks", "exclude", "jobs")
+    given = {name: getattr(options, name) for name in names}
     given["settings"] = EncounterSettings(area=options.area, has_walls=options.walls)
-    print(
-        fit(
-            options.data,
-            reading=_read_options(options, options.data),
-            **given,
-        )
-    )
+    given["reading"] = _read_options(options, options.data)
+    print(fit(options.data, **given))
     return 0
 
 
@@ -322,7 +296,7 @@ def _parse_parameter(text: str) -> tuple[str, Any]:
 
 def _job_count(text: str) -> int:
     """A number of processes."""
-    if not text.isascii() or not text.isdigit() or len(text) > 9 or int(text) < 1:
+    if not re.fullmatch("[1-9][0-9]{0,8}", text):
         raise argparse.ArgumentTypeError(
             f"expected a whole number >= 1; got {text[:40]!a}"
         )

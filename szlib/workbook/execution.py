@@ -6,12 +6,14 @@ of CPU time for each notebook.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import sys
 import tempfile
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -110,7 +112,6 @@ def run_cells(
     import jupytext
     import nbformat
     import papermill
-    from jupyter_core.utils import ensure_event_loop
     from nbclient import NotebookClient
     from nbclient.exceptions import CellExecutionError
 
@@ -140,14 +141,12 @@ def run_cells(
     )
     own = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1"}
     failure = None
-    loop = ensure_event_loop()  # that of this thread, which Jupyter leaves open
     try:
-        client.execute(env={**os.environ, **own, **environment})
+        run = client.async_execute(env={**os.environ, **own, **environment})
+        with ThreadPoolExecutor(1) as thread:  # an event loop may run in this one
+            thread.submit(asyncio.run, run).result()
     except CellExecutionError as error:
         failure = error
-    finally:
-        if not loop.is_running():  # one that runs belongs to the caller
-            loop.close()
     write_file(folder / f"{script.stem}.ipynb", nbformat.writes(notebook))
     if failure:
         raise failure

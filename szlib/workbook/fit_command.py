@@ -10,27 +10,27 @@ from pathlib import Path
 
 import pandas as pd
 
-from ..control.settings import MPCSettings
-from ..core.errors import DataError, DataWarning, StorageError, ZoneError
+from .. import (
+    DataError,
+    DataWarning,
+    EncounterSettings,
+    Extraction,
+    MPCSettings,
+    Recipe,
+    SocialZone,
+    StorageError,
+    ZoneError,
+    find_encounters,
+    of_kind,
+    read_tracks,
+)
 from ..core.files import folder_purpose, write_file
 from ..core.input_files import file_content, printable, read_json_object
+from ..encounters import days as several_days
 from ..encounters.areas import AUTO
-from ..encounters.days import (
-    FEW_ENCOUNTERS,
-    PURPOSE,
-    Extraction,
-    known_area,
-    relax_conditions,
-    require_encounters,
-)
-from ..encounters.finding import find_encounters
-from ..encounters.kinds import of_kind
-from ..encounters.settings import EncounterSettings
 from ..tracks import datasets
-from ..tracks.clock import read_tracks
-from ..tracks.recipe import Recipe
 from ..zones.outliers import R_MAX
-from ..zones.social_zone import FORMAT, SocialZone
+from ..zones.social_zone import FORMAT
 from ..zones.uncertainty import N_RESAMPLES
 from ..zones.verdict import describe_missing_encounters
 from .folders import require_place
@@ -76,7 +76,7 @@ def fit(
     from matplotlib.figure import Figure
 
     file = _require_place(Path(out))
-    if any(folder_purpose(path) == PURPOSE for path in paths):
+    if any(folder_purpose(path) == several_days.PURPOSE for path in paths):
         if len(paths) > 1:
             raise DataError(
                 f"{' '.join(paths)}: give one folder of extracted days, or files of tracks"
@@ -97,22 +97,18 @@ def fit(
             )
         table = read_tracks(files, recipe=reading) if files else None
     else:
-        for name in [
-            name for name, given in (("tracks", tracks), ("exclude", exclude)) if given
-        ]:
+        if tracks or exclude:
             raise DataError(
-                f"--{name} belongs to a folder of extracted days; {paths[0]} is none"
+                f"--tracks and --exclude belong to a folder of extracted days; {paths[0]} is none"
             )
         files = datasets.find(paths)
-        settings = replace(settings, area=known_area(settings, files, reading) or AUTO)
+        settings = replace(
+            settings, area=several_days.known_area(settings, files, reading) or AUTO
+        )
         table = read_tracks(files, recipe=reading)
         samples = find_encounters(table, settings=settings)
-        is_small = (
-            "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS
-        )
-        require_encounters(
-            samples, relax_conditions(samples, table, settings) if is_small else ""
-        )
+        advice = several_days.relax_conditions(samples, lambda: table, settings)
+        several_days.require_encounters(samples, advice)
     samples, null = of_kind(samples, kind), None
     if table is not None:
         null = find_null_model(
@@ -177,12 +173,10 @@ def _require_place(file: Path) -> Path:
     """The `file`, if a zone can be written there."""
     if file.suffix != ".json":
         raise StorageError(f"{printable(file)}: expected a file that ends in .json")
-    if require_place(file).exists() and read_json_object(file).get("format") != FORMAT:
-        raise StorageError(
-            f"{printable(file)}: exists, and is no zone of szlib; choose another name"
-        )
-    if not file.exists() and (picture := file.with_suffix(".png")).exists():
-        raise StorageError(
-            f"{printable(picture)}: exists without a zone; choose another name for the zone"
-        )
+    is_zone = read_json_object(require_place(file)).get("format") == FORMAT
+    for each in (file, file.with_suffix(".png")):
+        if each.exists() and not is_zone:
+            raise StorageError(
+                f"{printable(each)}: exists, and is no zone of szlib; choose another name"
+            )
     return file

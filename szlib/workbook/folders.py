@@ -67,12 +67,9 @@ def find_notebooks(folder: str | Path | None = None) -> Path:
     Raises DataError if there are none.
     """
     given = Path(folder or ".").resolve()
-    places = (
-        [NOTEBOOKS]
-        if folder is None and NOTEBOOKS != BUNDLED
-        else [given, given / "notebooks"]
-    )
-    places += [BUNDLED] if folder is None else []
+    places = [given, given / "notebooks"]
+    if folder is None:
+        places = [*places, BUNDLED] if NOTEBOOKS == BUNDLED else [NOTEBOOKS]
     found = next((place for place in places if list_notebooks(place)), None)
     if found is None:
         name = printable(folder or NOTEBOOKS)
@@ -183,21 +180,12 @@ def remove_outputs(folder: Path, notebooks: Iterable[str]) -> None:
 
     Raises OSError if a file cannot be removed.
     """
-    for file in [
-        folder / REPORT,
-        *(file for name in notebooks for file in list_outputs(folder, name)),
-    ]:
+    files = [folder / REPORT]
+    for name in notebooks:
+        files += [folder / f"{name}.ipynb", folder / "records" / f"{name}.json"]
+        files += (folder / "figures").glob(f"{name}-*")
+    for file in files:
         file.unlink(missing_ok=True)
-
-
-def list_outputs(folder: Path, notebook: str) -> list[Path]:
-    """Files of a `notebook` in a results `folder` that every run writes again: copy, record and figures."""
-    figures = (folder / "figures").glob(f"{notebook}-*")
-    return [
-        folder / f"{notebook}.ipynb",
-        folder / "records" / f"{notebook}.json",
-        *figures,
-    ]
 
 
 def require_place(file: Path) -> Path:

@@ -15,7 +15,7 @@ from typing import Any
 
 import nbformat
 import pandas as pd
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import FileSystemLoader
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
@@ -26,22 +26,18 @@ from ..plaza.settings import PlazaSettings
 from ..simulation import SCENARIOS
 from ..tracks import datasets, funnels
 from . import folders
-from .claims import NOT_RUN, judge
-from .paper_sentences import load_sentences
+from .claims import NOT_RUN
+from .paper_sentences import judge_sentences
 from .record.data_cache import read_stored_zone
-from .record.display import format_value
 from .record.parameters import METHOD_DEFAULTS
+from .summary import STATIC, fill_template
 
-REPORT = folders.REPORT
-_STATIC = Path(__file__).parent / "static"
 # The kinds of outputs that are shown, the first of them that an output has.
 _OUTPUTS = ["text/html", "text/markdown", "image/png", "image/jpeg", "text/plain"]
 # The text of a link to another file, and the name of the file without folder and ending.
 _FILE_LINK = re.compile(
     r"(?<!!)\[([^]\n]+)\]\((?!https?:|#|mailto:|data:)(?:[^)\s]*/)?([^)\s/.]*)(?:\([^)\s]*\)|[^)\s/])*\)"
 )
-# The figure of a player, and the description of its run.
-_PLAYER = re.compile(r'(<figure class="szlib-player"[^>]*>)<img [^>]*alt="([^"]*)"')
 
 
 def write_report(home: Path, summary: Mapping[str, Any]) -> Path:
@@ -65,14 +61,14 @@ def write_report(home: Path, summary: Mapping[str, Any]) -> Path:
         cell["id"] = f"cell-{i}"
     exporter = HTMLExporter(
         config=Config(NbConvertBase={"display_data_priority": _OUTPUTS}),
-        extra_loaders=[FileSystemLoader(_STATIC)],
+        extra_loaders=[FileSystemLoader(STATIC)],
         extra_template_basedirs=[],  # not the current folder, which is the default
         template_file="report.html.j2",
     )
-    script = (_STATIC / "report.js").read_text(encoding="utf-8")
+    script = (STATIC / "report.js").read_text(encoding="utf-8")
     html, _ = exporter.from_notebook_node(page, {"script": script})
-    write_file(home / REPORT, html)
-    return home / REPORT
+    write_file(home / folders.REPORT, html)
+    return home / folders.REPORT
 
 
 def _read_notebook(file: Path, names: Sequence[str]) -> nbformat.NotebookNode:
@@ -133,9 +129,6 @@ def _render_front_page(
     home: Path, summary: Mapping[str, Any], notebooks: Mapping[str, Any]
 ) -> Sequence[str]:
     """The pages before and after the executed `notebooks` as HTML, made from the results in `home`."""
-    pages = Environment(
-        loader=FileSystemLoader(_STATIC), autoescape=True, undefined=StrictUndefined
-    )
     given = summary["parameters"]
     speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
     is_synthetic = summary["data"] == datasets.SYNTHETIC
@@ -146,8 +139,10 @@ def _render_front_page(
     for name, notebook in notebooks.items():
         notebook.cells[0].metadata["fold"]["outcome"] = outcomes[name]
     checks = [check for outcome in outcomes.values() for check in outcome["checks"]]
+    named = {check["key"]: check for check in checks}
     verdict = str(summary.get("verdict", ""))
-    html = pages.get_template("front_page.html.j2").render(
+    html = fill_template(
+        "front_page.html.j2",
         **{name: str(summary.get(name, "")) for name in _DESCRIBED},
         speed=speed,
         is_synthetic=is_synthetic,
@@ -158,11 +153,12 @@ def _render_front_page(
         outcomes=outcomes,
         checks=checks,
         not_run=NOT_RUN,
-        claims=_list_claims(checks),
+        claims=judge_sentences(named).query("kind == 'claim'").to_dict("records"),
+        named=named,
         notebooks=list(notebooks),
-        funnel=_show_funnel(home / "encounters.parquet"),
+        stages=_list_stages(home / "encounters.parquet"),
         zone=_show_zone(home / "zone.json", speed, is_synthetic=is_synthetic),
-        players=_find_players(notebooks),
+        scenarios={each.title: name for name, each in SCENARIOS.items()},
     )
     return html.rpartition("<!-- notebooks -->")[::2]
 
@@ -171,45 +167,22 @@ def _render_front_page(
 _DESCRIBED = ("data", "area", "date", "command", "machine", "szlib", "versions")
 
 
-def _show_funnel(samples: Path) -> str:
-    """The stages of the encounters in the file `samples` as a table; "" without a file."""
+def _list_stages(samples: Path) -> list[dict[str, Any]]:
+    """The stages of the encounters in the file `samples`; none without a file."""
     if not samples.exists():
-        return ""
-    stages = funnels.table(funnels.get(pd.read_parquet(samples, columns=[])))
-    # each is named once
-    stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")
-    rows = {"rows": "{:,}".format}
-    return str(stages.to_html(index=False, border=0, formatters=rows))
-
-
-def _list_claims(checks: Sequence[Mapping[str, Any]]) -> Any:
-    """The claims of the paper, each with its verdict and the `checks` of this run that it rests on."""
-    named = {check["key"]: check for check in checks}
-    claims: Any = load_sentences().query("kind == 'claim'")
-    held_by = claims["held_by"]
-    claims["verdict"] = [judge("claim", names, named) for names in held_by]
-    claims["checks"] = [[named[n] for n in names if n in named] for names in held_by]
-    return claims.to_dict("records")
+        return []
+    table = funnels.table(funnels.get(pd.read_parquet(samples, columns=[])))
+    return table.to_dict("records")  # type: ignore[return-value]
 
 
 def _format_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
     """The outcome of the notebook `name` with its numbers as texts."""
     number = name.split("_")[0]
     checks = [
-        {
-            **check,
-            "value": format_value(check["value"]),
-            "notebook": name,
-            "key": f"{number}: {check['name']}",
-        }
+        {"notebook": name, "key": f"{number}: {check['name']}", **check}
         for check in outcome["checks"]
     ]
-    return {
-        "status": outcome["status"],
-        "error": outcome.get("error", outcome["status"]),
-        "seconds": f"{outcome['seconds']:.0f}",
-        "checks": checks,
-    }
+    return {"error": outcome["status"], **outcome, "checks": checks}
 
 
 def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any]:
@@ -222,13 +195,9 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
     if zone is None:
         return {}
     table = zone.table()
-    shown = table.filter(
-        regex="^(speed|center_x|[ab](_low|_high)?|encounters|adequate|verdict)$"
-    )
-    texts: dict[str, Any] = {
-        "method": zone.method,
-        "table": shown.round(2).to_html(index=False, border=0),
-    }
+    names = "^(speed|center_x|[ab](_low|_high)?|encounters|adequate|verdict)$"
+    shown = table.filter(regex=names).round(2).to_html(index=False, border=0)
+    texts: dict[str, Any] = {"method": zone.method, "table": shown}
     if speed in zone.ellipses:
         figure, content = Figure(figsize=(4.8, 4.5), layout="constrained"), io.BytesIO()
         truth = PlazaSettings().true_zone(speed) if is_synthetic else None
@@ -240,23 +209,3 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
             "size": table.set_index("speed").loc[speed].to_dict(),
         }
     return texts
-
-
-def _find_players(notebooks: Mapping[str, Any]) -> dict[str, str]:
-    """A second figure for the first player of each scenario; the script of the first one plays both."""
-    html = [
-        data.get("text/html", "")
-        for notebook in notebooks.values()
-        for cell in notebook.cells
-        for data in _list_data(cell)
-    ]
-    figures = {
-        alt.rpartition(":")[0]: figure
-        for figure, alt in reversed(_PLAYER.findall("".join(html)))
-    }
-    titles = {s.title: s.name.replace("_", " ") for s in SCENARIOS.values()}
-    return {
-        name: f"{figures[title]}</figure>"
-        for title, name in titles.items()
-        if title in figures
-    }

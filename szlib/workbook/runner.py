@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +33,8 @@ from ..core.parallel import limit_jobs, safe_path
 from ..tracks import datasets, funnels
 from . import folders
 from .execution import EMPTY_RECORD, execute_notebook
-from .record.data_cache import DataCache, describe_missing_data, read_stored_zone
-from .record.parameters import METHOD_DEFAULTS, check_parameters
+from .record.data_cache import DataCache, describe_missing_data
+from .record.parameters import check_parameters
 
 # The notebooks whose results later ones need (the encounters, the zone), and those that read all records.
 PRODUCERS, SUMMARIES = ("02", "05"), ("28",)
@@ -88,18 +89,12 @@ def run(
     data = folders.absolute_data(data)
     home = folders.claim_results(root, data, given)
     with folder_lock(home), safe_path():
-        cache = DataCache(home, data, seed=given.get("seed", 0))
+        cache = DataCache.from_variables(home, given | {"data": data}, [])
         contents = [[file.name, *file_content(file)] for file in cache.files()]
         source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
         source |= {"files": contents, "parameters": given}
         names = [script.stem for script in scripts]
-        known = {script.stem for script in folders.list_notebooks(place)}
-        outcomes = {
-            name: outcome
-            for name, outcome in _stored_outcomes(home, source).items()
-            if name in known
-        }
-        outcomes |= dict.fromkeys(names, NOT_STARTED)
+        outcomes = _stored_outcomes(home, source) | dict.fromkeys(names, NOT_STARTED)
         write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
         folders.remove_outputs(home, names)
         unfinished = {**source, "passed": False, "notebooks": outcomes}
@@ -108,7 +103,7 @@ def run(
         for name, outcome in _execute_all(scripts, variables, home, jobs, figures):
             outcomes[name] = outcome
             _store(home, unfinished)
-        source |= _describe_machine() | _describe_data(home, source, outcomes)
+        source |= _describe_machine() | _describe_data(cache, outcomes)
         summary = _store(home, _summarise(source, outcomes))
         if any((home / f"{name}.ipynb").exists() for name in outcomes):
             # importing it takes longer than all other imports
@@ -124,17 +119,18 @@ def _describe_machine() -> dict[str, Any]:
     return {
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "command": shlex.join(["szlib", *sys.argv[1:]]),
-        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "machine": f"{platform.platform()}, {os.cpu_count()} cores",
         "versions": ", ".join([python, *(f"{p} {version(p)}" for p in PACKAGES)]),
     }
 
 
-def _describe_data(
-    home: Path, source: Mapping[str, Any], outcomes: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Area, warnings and verdict of the data of a run, from the encounters and the zone in `home`."""
-    found: dict[str, Any] = {}
-    verdict, samples = _judge(home, source), home / "encounters.parquet"
+def _describe_data(cache: DataCache, outcomes: Mapping[str, Any]) -> dict[str, Any]:
+    """Area, warnings and verdict of the data of a run, from its stored encounters and zone."""
+    found, verdict = dict[str, Any](), ""
+    samples = Path(cache.folder) / "encounters.parquet"
+    if zone := cache.stored_zone():
+        speed = cache.method.zone_speed
+        verdict = f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
     if samples.exists():
         table = pd.read_parquet(samples, columns=[])
         found["warnings"] = funnels.warnings(funnels.get(table))
@@ -148,29 +144,18 @@ def _describe_data(
     return found | ({"verdict": verdict} if verdict else {})
 
 
-def _judge(home: Path, source: Mapping[str, Any]) -> str:
-    """The verdict on the zone in `home`; "" if there is none that was made from the data of `source`."""
-    zone = read_stored_zone(home / "zone.json")
-    made_of = zone.provenance.get("source", {}) if zone else {}
-    if not zone or made_of.get("files") != json.loads(json.dumps(source["files"])):
-        return ""
-    default = METHOD_DEFAULTS["zone_speed"]
-    speed = float(source["parameters"].get("zone_speed", default))
-    return f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
-
-
 def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Path]:
     """The scripts of the notebooks in `place` whose numbers or names are in `only`; all if it is empty.
 
     Raises DataError for an unknown name, and if there are no notebooks.
     """
-    scripts, names = folders.list_notebooks(place or folders.find_notebooks()), [*only]
-    found = {name: [s for s in scripts if folders.has_name(s, name)] for name in names}
-    if unknown := [name for name in names if not found[name]]:
+    scripts = folders.list_notebooks(place or folders.find_notebooks())
+    found = {name: [s for s in scripts if folders.has_name(s, name)] for name in only}
+    if unknown := [name for name, each in found.items() if not each]:
         known = ", ".join(script.stem for script in scripts)
         raise DataError(f"no notebook {', '.join(unknown)}; there are {known}")
     chosen = sum(found.values(), start=list[Path]())
-    return [script for script in scripts if not names or script in chosen]
+    return [script for script in scripts if not found or script in chosen]
 
 
 def _execute_all(
@@ -189,13 +174,9 @@ def _execute_all(
         memory.VARIABLE: str(memory.limit() // jobs),
         "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", threads),
     }
-    workers = Parallel(
-        max(jobs, 2),  # at least one thread: signals stay with this one
-        pre_dispatch=jobs,
-        backend="threading",
-        return_as="generator_unordered",
-        batch_size=1,
-    )
+    # at least one thread besides this one, with which signals stay
+    options = {"backend": "threading", "return_as": "generator_unordered"}
+    workers = Parallel(max(jobs, 2), pre_dispatch=jobs, batch_size=1, **options)
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
     with bar, temporary_folder() as private:
         environment |= {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
@@ -237,22 +218,22 @@ def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
 
     The notebooks of a batch can run at the same time.
     """
-    batches: list[list[Path]] = [[] for _ in range(len(PRODUCERS) + 2)]
-    for script in sorted(scripts, key=lambda script: script.stem[:2] not in LONGEST):
+
+    def find_batch(script: Path) -> tuple[bool, list[bool]]:
+        """Whether it is a summary, and after which producers it comes."""
         number = script.stem[:2]
-        batch = sum(number > producer for producer in PRODUCERS)
-        batches[-1 if number in SUMMARIES else batch].append(script)
-    return batches
+        return number in SUMMARIES, [number > each for each in PRODUCERS]
+
+    ordered = sorted(scripts, key=lambda s: (find_batch(s), s.stem[:2] not in LONGEST))
+    return [list(batch) for _, batch in groupby(ordered, find_batch)]
 
 
 def _stored_outcomes(
     home: Path, source: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
     """The outcomes of an earlier run of the same `source`: version, data and parameters."""
-    stored = read_json_object(home / SUMMARY)
-    is_same = {name: stored.get(name) for name in source} == json.loads(
-        json.dumps(source)
-    )
+    stored, as_stored = read_json_object(home / SUMMARY), json.loads(json.dumps(source))
+    is_same = as_stored.items() <= stored.items()
     return dict(stored["notebooks"]) if is_same else {}
 
 
@@ -271,6 +252,7 @@ def _summarise(
 
 def has_passed(outcome: Mapping[str, Any]) -> bool:
     """Whether a notebook with this `outcome` has finished or is undecided, and none of its checks failed."""
-    checks = [check for check in outcome["checks"] if check["kind"] == "check"]
-    is_over = outcome["status"] in ("done", "undecided")
-    return is_over and all(check["passed"] for check in checks)
+    has_failed = any(
+        check["kind"] == "check" and not check["passed"] for check in outcome["checks"]
+    )
+    return outcome["status"] in ("done", "undecided") and not has_failed

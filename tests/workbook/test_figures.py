@@ -148,7 +148,7 @@ MAPS = {
         np.eye(2).repeat(3, axis=0), np.arange(6) < 1
     ),
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
-    "zones": lambda f: figures.plot_zones(f("zone").ellipses),
+    "zones": lambda f: figures.plot_zones(f("zone")),
     "ellipse": lambda f: plots.plot_distance(ZONE),
     "segment": lambda f: plots.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
     "scenario": lambda f: figures.plot_scenario(f("log")),
@@ -417,13 +417,13 @@ def test_claims_differ_by_more_than_colour_and_keep_their_units():
     table = pd.DataFrame(
         {"claim": list("abcd"), "effect": [1.0, -1.0, 0.1, np.nan], "low": [0.5, -2, -1, np.nan],
          "high": [2.0, -0.5, 1, np.nan], "unit": ["m", "m2", "s", "m"],
-         "verdict": ["supported", "contradicted", *["not decidable with n = 3"] * 2]}
+         "verdict": ["supported", "not supported", *["not decidable with n = 3"] * 2]}
     )  # fmt: skip
     panels = plots.draw_claims(table).axes
     assert len({ax.lines[0].get_marker() for ax in panels}) == 3
     assert [ax.get_title(loc="left") for ax in panels] == list("abcd")
     assert [ax.get_title(loc="right") for ax in panels[1:3]] == [
-        "contradicted",
+        "not supported",
         "not decidable",
     ]
     assert [ax.get_xlabel() for ax in panels] == ["m", "m2", "s", "m"]

@@ -137,7 +137,7 @@ def test_excluded_day_is_not_fitted(
             ["{days}", "--out", "{folder}/other.json"],
             "other.json: exists, and is no zone of szlib",
         ),
-        (["{days}", "--out", "{folder}/plan.json"], "plan.png: exists without a zone"),
+        (["{days}", "--out", "{folder}/plan.json"], "plan.png: exists, and is no zone"),
         (
             ["{days}", "--out", "{folder}/nowhere/zone.json"],
             "nowhere: is no folder that can be written",
@@ -156,12 +156,12 @@ def test_excluded_day_is_not_fitted(
         ),
         (
             ["{day}", "--tracks", "{day}"],
-            "--tracks belongs to a folder of extracted days",
+            "--tracks and --exclude belong to a folder of extracted days",
         ),
         (["{missing}"], "missing.csv: no such file"),
         (
             ["{day}", "--exclude", "2012-10-24"],
-            "--exclude belongs to a folder of extracted days",
+            "--tracks and --exclude belong to a folder of extracted days",
         ),
     ],
 )

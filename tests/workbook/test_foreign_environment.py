@@ -11,7 +11,7 @@ import nbformat
 import pytest
 
 from szlib.core import files
-from szlib.workbook import cli, report, runner
+from szlib.workbook import cli, folders, runner
 from szlib.workbook.cli import main
 
 STALE = {
@@ -124,5 +124,5 @@ def test_report_uses_no_template_of_the_current_folder(notebooks, tmp_path):
     template.parent.mkdir(parents=True)
     template.write_text("{{ cycler.__init__.__globals__.os.mkdir('executed') }}")
     assert runner.run("mine.csv", out=tmp_path / "out")["passed"]
-    assert "01_one" in (tmp_path / "out" / "mine" / report.REPORT).read_text()
+    assert "01_one" in (tmp_path / "out" / "mine" / folders.REPORT).read_text()
     assert not (tmp_path / "executed").exists()

@@ -196,7 +196,7 @@ def test_checks_come_from_the_records_of_the_run(tmp_path, monkeypatch):
     ]
     rows = paper_sentences.load_sentences().head(4).assign(kind="claim", held_by=names)
     monkeypatch.setattr(paper_sentences, "load_sentences", rows.copy)
-    table = paper_sentences.judge_sentences(record)
+    table = paper_sentences.judge_sentences(paper_sentences.read_checks(record))
     assert table["verdict"].tolist() == [
         "supported",
         "not decidable",

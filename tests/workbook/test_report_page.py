@@ -9,9 +9,8 @@ import pytest
 from bs4 import BeautifulSoup
 
 import szlib
-from szlib.workbook import report as reports
+from szlib.workbook import paper_sentences
 from szlib.workbook.folders import NOTEBOOKS
-from szlib.workbook.paper_sentences import load_sentences
 from szlib.workbook.record import PAPER, parameters
 from szlib.workbook.record.display import format_value
 from szlib.workbook.report import write_report
@@ -48,12 +47,12 @@ def parse(report):
 @pytest.fixture(scope="module", autouse=True)
 def sentences_held_by_notebook_10():
     """The claims that notebook 28 judges are here those of notebook 10."""
-    table = load_sentences()
+    table = paper_sentences.load_sentences()
     table["held_by"] = [
         [name.replace("28: ", "10: ") for name in names] for names in table["held_by"]
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reports, "load_sentences", table.copy)
+        patch.setattr(paper_sentences, "load_sentences", table.copy)
         yield
 
 
@@ -220,14 +219,16 @@ def test_sections_stand_in_their_order_and_none_is_empty(page):
     ]
 
 
-def test_movie_is_on_the_front_page_and_in_its_notebook(page, movie):
+def test_movie_is_in_its_notebook_and_the_front_page_has_room_for_it(page, movie):
     name = re.search("data-run=.(szlib-[0-9a-f]{8})", movie._repr_html_())[1]
-    first, second = page.select("figure.szlib-player")
-    assert first["data-run"] == second["data-run"] == name
-    assert first.find_parent(class_="players")
-    assert second.find_parent("details")["id"] == "10_corridor"
-    assert second.img["alt"] == movie.run["alt"]
-    script = second.find_next("script").text
+    (figure,) = page.select("figure.szlib-player")
+    assert figure["data-run"] == name
+    assert figure.find_parent("details")["id"] == "10_corridor"
+    assert figure.img["alt"] == movie.run["alt"]
+    shown = json.loads(page.select_one(".players")["data-scenarios"])
+    (title,) = (title for title, name in shown.items() if name == "corridor")
+    assert figure.img["alt"].startswith(f"{title}:"), "so report.js finds it"
+    script = figure.find_next("script").text
     run = json.loads(re.search(r"^const run = (.*);$", script, re.MULTILINE)[1])
     assert run == json.loads(json.dumps(movie.run))
     assert len(run["snapshots"]) == 11

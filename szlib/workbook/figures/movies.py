@@ -127,17 +127,14 @@ class Movie(bytes):
         limits : x0, x1, y0, y1 of the scene [m].
         """
         movie = super().__new__(cls, gif)
-        columns = run.time.tolist(), run.states, run.people, run.predicted, run.h
-        steps = run.status.tolist(), run.stuck.tolist()
-        n = len(run.zones)
+        time, stuck, n = run.time.tolist(), run.stuck.tolist(), len(run.zones)
+        columns = time, run.states, run.people, run.predicted, run.h, run.status, stuck
         movie.run = {
             "layout": scene_layout(run.scenario, run.settings, limits),
             "snapshots": [
-                snapshot(t, state, people, run.zones, plan, h, status)
-                | {"stuck": stuck}
-                for t, state, people, plan, h, status, stuck in zip(
-                    *columns, *steps, strict=True
-                )
+                snapshot(t, state, people, run.zones, plan, h, str(status))
+                | {"stuck": s}
+                for t, state, people, plan, h, status, s in zip(*columns, strict=True)
             ],
             "alt": f"{run.scenario.title or run.scenario.name}: a robot and {n} "
             f"{'person' if n == 1 else 'people'}, {run.time[-1]:.1f} s",

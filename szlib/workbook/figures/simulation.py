@@ -13,11 +13,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.patches import Ellipse as EllipsePatch
 from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
-from ...core.checks import Array
 from ...simulation import Run, Scenario
 from ...zones.ellipses import Ellipse
 from .movies import Movie, place_zones
@@ -37,6 +35,12 @@ _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 _PADDING = 0.2  # margin around everything that is drawn [m]
 _SAME_PLACE = 0.35  # positions nearer to the last label than this have none [m]
+# the labels of times
+_OF_ROBOT: Any = {"ha": "center", "va": "center", "fontsize": 8, "color": BLACK}
+_OF_ROBOT |= {"xytext": (0, 0), "textcoords": "offset points"}
+_OF_ROBOT["path_effects"] = [Stroke(linewidth=2, foreground="white"), Normal()]
+_OF_PERSON = _OF_ROBOT | {"color": "#7A2E00", "xytext": (0, 8)}  # dark red
+_LEGEND = ("o", BLUE, "robot"), ("-", RED, "zone"), ("^", RED, "person")
 # a wall is drawn to its end if the end is at most this far from all else [m]
 _WALL_EXTENT = 3.0
 
@@ -74,18 +78,16 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
         linewidth=0.6,
         label="robot's path",
     )
+    labelled = np.full((1 + len(run.zones), 2), np.inf)  # of the robot, and of people
     for row in shown.tolist():
         depth = run.time[row] / max(run.time[-1], 1e-9)
         draw_moving(ax, run, row, robot=_ROBOT_COLOURS(depth), zone=ZONE_COLOURS(depth))
-    _write_times(ax, run.time[shown], run.states[shown, :2], colour=BLACK, above=0)
-    for i in range(len(run.zones)):
-        # dark red
-        _write_times(
-            ax, run.time[shown], run.people[shown, i, :2], colour="#7A2E00", above=8
-        )
-    ax.plot([], [], "o", color=BLUE, label="robot")
-    ax.plot([], [], color=RED, label="zone")
-    ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
+        places = np.vstack([run.states[row, :2], run.people[row, :, :2]])
+        for i in np.flatnonzero(np.hypot(*(places - labelled).T) > _SAME_PLACE):
+            labelled[i], text = places[i], f"{run.time[row]:.3g}"
+            ax.annotate(text, places[i], **(_OF_PERSON if i else _OF_ROBOT))
+    for mark, colour, name in _LEGEND:
+        ax.plot([], [], mark, color=colour, label=name)
     add_legend_below(ax, gap=0.14, ncols=6)
     return label_metres(ax, f"{run.scenario.title} (times in s; later is darker)")
 
@@ -159,11 +161,8 @@ def draw_scenery(ax: Axes, scenario: Scenario) -> None:
 
 def draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
     """Draw the outline of a `zone` on `ax` in a `colour`."""
-    (a, b), angle = zone.semi_axes, np.degrees(zone.angle)
-    patch = EllipsePatch(
-        zone.center, 2 * a, 2 * b, angle=angle, fill=False, edgecolor=colour, lw=1.6
-    )
-    return ax.add_patch(patch)
+    (line,) = ax.plot(*zone.curve().T, color=colour, linewidth=1.6)
+    return line
 
 
 def draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[Artist]:
@@ -183,25 +182,6 @@ def draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[
     return drawn
 
 
-def _write_times(
-    ax: Axes, time: Array, positions: Array, *, colour: str, above: float
-) -> None:
-    """Write the times, shape (n,) [s], beside the positions, shape (n, 2) [m]; NaN for an absent person.
-
-    Whoever stays in one place has one label, with the first time.
-    """
-    halo = [Stroke(linewidth=2, foreground="white"), Normal()]
-    last = np.full(2, np.inf)
-    for seconds, here in zip(time, positions, strict=True):
-        if not np.hypot(*(here - last)) > _SAME_PLACE:
-            continue
-        label = ax.annotate(
-            f"{seconds:.3g}", here, (0, above), textcoords="offset points"
-        )
-        label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
-        last = here
-
-
 def set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
     """Set limits of `ax` that hold the paths, the goal, and the zones in the rows `shown` of each run.
 
@@ -214,10 +194,11 @@ def set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
         points += [run.states[:, :2] + radius, run.states[:, :2] - radius]
         for people in run.people[rows]:
             points += [zone.curve(25) for zone in place_zones(run.zones, people)]
-    drawn = np.vstack(points)
+    drawn, ends = np.vstack(points), first.scenario.walls.reshape(-1, 2)
+    is_after, is_before = (
+        ends > drawn.min(axis=0) - _WALL_EXTENT,
+        ends < drawn.max(axis=0) + _WALL_EXTENT,
+    )
+    drawn = np.vstack([drawn, ends[(is_after & is_before).all(axis=1)]])
     low, high = drawn.min(axis=0) - _PADDING, drawn.max(axis=0) + _PADDING
-    ends = first.scenario.walls.reshape(-1, 2)
-    near = ((ends > low - _WALL_EXTENT) & (ends < high + _WALL_EXTENT)).all(axis=1)
-    low = np.minimum(low, ends[near].min(axis=0, initial=np.inf) - _PADDING)
-    high = np.maximum(high, ends[near].max(axis=0, initial=-np.inf) + _PADDING)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))

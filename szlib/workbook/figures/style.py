@@ -89,10 +89,9 @@ def add_legend_below(ax: Axes, *, gap: float = 0.13, ncols: int = 2) -> Legend:
     >>> legend = figures.add_legend_below(ax)
     """
     handles, names = ax.get_legend_handles_labels()
-    first = dict(zip(reversed(names), reversed(handles), strict=True))
-    unique = {name: first[name] for name in names}
+    known = dict(zip(names, handles, strict=True))
     place: Any = {"loc": "upper center", "bbox_to_anchor": (0.5, -gap)}
-    return ax.legend(unique.values(), unique.keys(), **place, ncols=ncols, fontsize=8)
+    return ax.legend(known.values(), known, **place, ncols=ncols, fontsize=8)
 
 
 def add_shared_legend(panels: Sequence[Axes]) -> None:
@@ -137,16 +136,13 @@ def alt_text(figure: Figure) -> str:
     parts = [figure.get_suptitle()]
     for ax in figure.axes:
         x, y, legend = ax.get_xlabel(), ax.get_ylabel(), ax.get_legend()
-        part = ": ".join(
-            text
-            for text in (ax.get_title(), f"{y} over {x}" if x and y else x or y)
-            if text
-        )
+        axes = f"{y} over {x}" if x and y else x or y
+        part = ": ".join(filter(None, (ax.get_title(), axes)))
         names = (
             ", ".join(text.get_text() for text in legend.get_texts()) if legend else ""
         )
         parts.append(f"{part}, with {names}" if names else part)
-    return " ".join("; ".join(part for part in parts if part).split())
+    return " ".join("; ".join(filter(None, parts)).split())
 
 
 def draw_obstacle(ax: Axes, obstacle: Obstacle) -> list[Array]:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -12,7 +9,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
-from ...core.errors import DataWarning
 from ...zones.ellipses import Ellipse
 from .style import (
     BLACK,
@@ -29,8 +25,6 @@ from .style import (
 
 FittedZone = Any
 """A `szlib.SocialZone`; it imports this module for its method `plot`, so it cannot be imported here."""
-
-_LINES = ("-", "--", ":", "-.")
 
 
 def plot_zone(
@@ -63,15 +57,9 @@ def plot_zone(
     'Minimum social zone at 1.1 m/s: undecided'
     """
     ax = get_axes(ax, size=(5, 4.5))
-    with warnings.catch_warnings(
-        action="ignore", category=DataWarning
-    ):  # dashed, and said in the title
-        ellipse = zone.ellipse(speed)
-    boundary, verdict, is_hull = (
-        zone.boundary(speed),
-        zone.verdict(speed),
-        zone.method in ("hull", "paper"),
-    )
+    boundary, verdict = zone.boundary(speed), zone.verdict(speed)
+    ellipse = zone.ellipses.get(speed) or zone.shape.ellipse(speed)
+    is_hull = zone.method in ("hull", "paper")
     if is_hull:
         ax.fill(*boundary.T, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
     else:
@@ -101,42 +89,26 @@ def plot_zone(
     )
 
 
-def plot_zones(
-    zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None = None
-) -> Axes:
-    """Plot ellipses by speed around a person who walks to the right (paper, fig. 5).
+def plot_zones(zone: FittedZone, *, ax: Axes | None = None) -> Axes:
+    """Plot the ellipses of a fitted zone, and their intervals, by speed (paper, fig. 5).
+
+    The person walks to the right. A dashed ellipse is not usable; the legend states the verdicts.
 
     Parameters
     ----------
-    zones : a fitted zone, or ellipses by walking speed [m/s]. A fitted zone is drawn with its intervals; a
-        dashed ellipse is not usable, and the legend states the verdict.
+    zone : fitted zone.
     ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> ellipse = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
-    >>> ax = figures.plot_zones({0.9: ellipse, 1.1: ellipse.scaled(1.1)})
     """
-    ax = get_axes(ax, size=(6, 5))
-    zone = None if isinstance(zones, Mapping) else zones
-    shown = sorted((zones if isinstance(zones, Mapping) else zones.ellipses).items())
-    for (speed, ellipse), colour, line in zip(
-        shown, pick_colours(shown), cycle(_LINES), strict=False
-    ):
-        label = f"{speed:g} m/s"
-        if zone:
-            verdict = zone.verdict(speed)
-            line = "-" if verdict == "usable" else "--"
-            label = label if verdict == "usable" else f"{label} ({verdict})"
-            _draw_interval(ax, zone, speed, color=colour, alpha=0.15)
-        ax.plot(
-            *ellipse.curve().T, color=colour, linestyle=line, linewidth=2, label=label
-        )
+    ax, speeds = get_axes(ax, size=(6, 5)), sorted(zone.ellipses)
+    for speed, colour in zip(speeds, pick_colours(speeds), strict=True):
+        verdict = zone.verdict(speed)
+        style: Any = {"color": colour, "label": f"{speed:g} m/s ({verdict})"}
+        line = "-" if verdict == "usable" else "--"
+        ax.plot(*zone.ellipses[speed].curve().T, line, linewidth=2, **style)
+        _draw_interval(ax, zone, speed, color=colour, alpha=0.15)
     draw_person(ax, 0, 0, 0, color=BLACK, markersize=10)
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
-    intervals = " and their 95 % intervals" if zone and zone.uncertainty else ""
+    intervals = " and their 95 % intervals" if zone.uncertainty else ""
     return label_metres(ax, f"Minimum social zones by speed{intervals}", person=True)
 
 
@@ -149,7 +121,7 @@ def _draw_interval(ax: Axes, zone: FittedZone, speed: float, **style: Any) -> No
     band = pd.concat([band, band.head(1)])
     unit = np.column_stack([np.cos(band["direction"]), np.sin(band["direction"])])
     low, high = (band[end].to_numpy()[:, None] * unit for end in ("low", "high"))
-    known = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
+    known = np.isfinite(low + high).all(axis=1)
     quads = np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1)[
         known[:-1] & known[1:]
     ]

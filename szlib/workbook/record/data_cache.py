@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,22 +12,28 @@ from typing import Any
 
 import pandas as pd
 
-from ... import __version__
-from ...core.errors import DataError, ZoneError
+from ... import (
+    DataError,
+    Ellipse,
+    EncounterSettings,
+    NullEncounters,
+    PlazaSettings,
+    SocialZone,
+    ZoneError,
+    __version__,
+    as_area,
+    find_encounters,
+    make_plaza,
+    null_encounters,
+    read_tracks,
+)
 from ...core.files import load_cached, store_cached, write_checksum
 from ...core.input_files import file_content, printable, unchanged_files
 from ...encounters import days
-from ...encounters.areas import as_area, place_apart
-from ...encounters.finding import find_encounters
+from ...encounters.areas import place_apart
 from ...encounters.geometry import Area
-from ...encounters.null_model import NullEncounters, null_encounters
-from ...encounters.settings import EncounterSettings
-from ...plaza.generation import make_plaza
-from ...plaza.settings import PlazaSettings
 from ...tracks import datasets
-from ...tracks.clock import read_tracks
-from ...zones.ellipses import Ellipse
-from ...zones.social_zone import SocialZone, recorded_hours
+from ...zones.social_zone import recorded_hours
 from ...zones.verdict import describe_missing_encounters
 from .parameters import ZoneMethod
 
@@ -72,6 +78,15 @@ class DataCache:
     seed: int = 0
     method: ZoneMethod = field(default_factory=ZoneMethod)
     contents: list[list[Any]] = field(default_factory=list, repr=False)
+
+    @classmethod
+    def from_variables(
+        cls, folder: Path, variables: Mapping[str, Any], contents: list[list[Any]]
+    ) -> DataCache:
+        """The cache in a `folder` for the `variables` of a notebook; `contents` as of the class."""
+        area, seed = variables.get("area", ""), variables.get("seed", 0)
+        method = ZoneMethod.from_variables(variables)
+        return cls(folder, variables["data"], area, seed, method, contents)
 
     @property
     def is_synthetic(self) -> bool:
@@ -119,9 +134,13 @@ class DataCache:
         """The encounters that notebook 02 stored, or the same found now."""
         if content := load_cached(self._path("encounters.parquet"), self._source()):
             return pd.read_parquet(io.BytesIO(content))
-        tracks = self.tracks()
-        settings = self.method.encounter_settings(self.find_area(tracks))
+        tracks, settings = self._searched()
         return self.store_encounters(find_encounters(tracks, settings=settings))
+
+    def _searched(self) -> tuple[pd.DataFrame, EncounterSettings]:
+        """The tracks, and the settings with which encounters are found in them."""
+        tracks = self.tracks()
+        return tracks, self.method.encounter_settings(self.find_area(tracks))
 
     def store_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Store the `samples` of encounters for later notebooks, and return them.
@@ -129,14 +148,8 @@ class DataCache:
         Raises DataError, which names the condition that rejected the last rows, if there are none.  If there
         are few, ``.attrs["advice"]`` says what relaxing a condition would give.
         """
-        advice = ""
-        if (
-            samples["encounter"].nunique() < days.FEW_ENCOUNTERS
-            and "area" in samples.attrs
-        ):
-            advice = days.relax_conditions(
-                samples, self.tracks(), self.method.encounter_settings()
-            )
+        settings = self.method.encounter_settings()
+        advice = days.relax_conditions(samples, self.tracks, settings)
         days.require_encounters(samples, advice).attrs["advice"] = advice
         content = io.BytesIO()
         samples.to_parquet(content)
@@ -147,8 +160,16 @@ class DataCache:
 
     def zone(self) -> SocialZone:
         """The zone that notebook 05 stored, or the same fitted now."""
-        file = self._path("zone.json")
-        return _load(file, self._zone_source()) or self.fit_zone()
+        return self.stored_zone() or self.fit_zone()
+
+    def stored_zone(self) -> SocialZone | None:
+        """The stored zone, if it was made from the same data and parameters, and is not damaged."""
+        file, source = self._path("zone.json"), self._zone_source()
+        zone = None if load_cached(file, source) is None else read_stored_zone(file)
+        is_same = zone and zone.provenance.get("source") == json.loads(
+            json.dumps(source)
+        )
+        return zone if is_same else None
 
     def fit_zone(self) -> SocialZone:
         """Fit the zone, test it against the null model, and store it for later notebooks."""
@@ -163,15 +184,9 @@ class DataCache:
 
         See `find_null_model` for its shifts, `few_shifts` where the data has many encounters.
         """
-        tracks = self.tracks()
-        settings = self.method.encounter_settings(self.find_area(tracks))
-        return find_null_model(
-            tracks,
-            self.encounters(),
-            settings,
-            few_shifts=few_shifts,
-            r_max=self.method.r_max,
-        )
+        tracks, settings = self._searched()
+        options: Any = {"few_shifts": few_shifts, "r_max": self.method.r_max}
+        return find_null_model(tracks, self.encounters(), settings, **options)
 
     def ellipse(self) -> Ellipse:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
@@ -223,17 +238,15 @@ class DataCache:
         """What encounters are made from: content of the files, parameters, version of szlib."""
         with self._unchanged_data():
             files = self.contents
-        source = {
+        return {
             "data": datasets.label(self.data),
             "seed": self.seed,
             "files": files,
             "area": self.area,
-        }
-        source |= {
             "szlib": __version__,
             "parameters": self.method.encounter_settings().as_json(),
+            "reading": self.method.reading,
         }
-        return source | {"reading": self.method.reading}
 
     def _zone_source(self) -> dict[str, Any]:
         """What the zone is made from."""
@@ -258,7 +271,7 @@ def find_null_model(
     )
     try:
         return null_encounters(
-            tracks, settings=settings, shifts=shifts, **{"progress": False, **options}
+            tracks, settings=settings, shifts=shifts, **{"progress": False} | options
         )
     except DataError as error:
         print(f"The zone is not tested against a null model: {error}")
@@ -282,13 +295,3 @@ def read_stored_zone(file: Path) -> SocialZone | None:
         return SocialZone.load(file)
     except ZoneError:
         return None
-
-
-def _load(file: Path, source: dict[str, Any]) -> SocialZone | None:
-    """The zone in a file, if it was made from `source` and is not damaged."""
-    zone = None if load_cached(file, source) is None else read_stored_zone(file)
-    return (
-        zone
-        if zone and zone.provenance.get("source") == json.loads(json.dumps(source))
-        else None
-    )

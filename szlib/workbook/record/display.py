@@ -12,13 +12,8 @@ from pandas.io.formats.style import Styler
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAPER, ASSUMED, MEASURED, TUNED, CHOSEN = (
-    "paper",
-    "assumed",
-    "measured",
-    "tuned",
-    "chosen",
-)
+BADGES = ("paper", "assumed", "measured", "tuned", "chosen")
+PAPER, ASSUMED, MEASURED, TUNED, CHOSEN = BADGES
 """Badges: the source of a parameter; tuned on the paper's four scenarios; chosen by the user."""
 # width of a figure in the notebook, as a fraction of the saved figure's
 _SHOWN_WIDTH = 2 / 3
@@ -39,9 +34,8 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
     parameter value badge    why
        window   3 s paper sec. 2
     """
-    known = (PAPER, ASSUMED, MEASURED, TUNED, CHOSEN)
-    if unknown := {badge for _, _, badge, _ in rows}.difference(known):
-        raise ValueError(f"badges must be {', '.join(known)}; got {sorted(unknown)}")
+    if unknown := {badge for _, _, badge, _ in rows}.difference(BADGES):
+        raise ValueError(f"badges must be {', '.join(BADGES)}; got {sorted(unknown)}")
     return _style(
         _FoldedTable, pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"])
     )

@@ -35,7 +35,7 @@ from .display import (
     show_figure,
     style_table,
 )
-from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, read_defaults
+from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, read_defaults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,9 +111,7 @@ class NotebookRecord:
             self.out = folders.claim_results(results / folders.LAB, data, given)
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
-        method, area = ZoneMethod.from_variables(variables), variables.get("area", "")
-        seed = variables.get("seed", 0)
-        self.cache = DataCache(self.out, data, area, seed, method, contents)
+        self.cache = DataCache.from_variables(self.out, variables, contents)
         format_outputs()
 
     def check(
@@ -155,13 +153,12 @@ class NotebookRecord:
 
     def figure(self, figure: Figure, name: str) -> None:
         """Save a `figure` in the results as NN_topic-`name`.png (`--figures`: also .svg), and show it."""
-        pictures = {}
-        for kind in filter(None, ("png", os.environ.get(folders.FIGURES_VARIABLE))):
+        content = io.BytesIO()
+        for kind in filter(None, (os.environ.get(folders.FIGURES_VARIABLE), "png")):
             content = io.BytesIO()
             figure.savefig(content, format=kind, dpi=150, bbox_inches="tight")
             self._save_picture(content.getvalue(), f"{self.name}-{name}.{kind}")
-            pictures[kind] = content.getvalue()
-        show_figure(figure, pictures["png"])
+        show_figure(figure, content.getvalue())
 
     def animation(self, content: bytes, name: str) -> None:
         """Save the `content` of an animated GIF in the results as NN_topic-`name`.gif."""
@@ -206,12 +203,10 @@ class NotebookRecord:
     def close(self) -> Styler:
         """Write the record for the summary of the run, and return a table of its checks and claims."""
         self._store(closed=True)
-        rows = [
-            (c["kind"], c["name"], c["result"], format_value(c["value"]))
-            for c in self.checks
-        ]
+        columns = ["kind", "name", "result", "value"]
+        values = [format_value(check["value"]) for check in self.checks]
         return style_table(
-            pd.DataFrame(rows, columns=["kind", "name", "result", "value"])
+            pd.DataFrame(self.checks, columns=columns).assign(value=values)
         )
 
     def _settings(self) -> str:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...control.settings import MPCSettings
-from ...core.errors import DataError, SolverError
+from ... import (
+    AttentionalSpace,
+    DataError,
+    EncounterSettings,
+    MPCSettings,
+    Recipe,
+    SolverError,
+    as_area,
+)
 from ...core.input_files import printable
-from ...encounters.areas import AUTO, as_area
-from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
-from ...encounters.settings import EncounterSettings
-from ...tracks.recipe import Recipe
+from ...encounters.areas import AUTO
+from ...encounters.geometry import PAPER_SPACE
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
@@ -69,13 +74,8 @@ class ZoneMethod:
     @classmethod
     def from_variables(cls, variables: Mapping[str, Any]) -> ZoneMethod:
         """Take the values from the `variables` of a notebook; a missing variable has its default."""
-        return cls(
-            **{
-                each.name: variables[each.name]
-                for each in fields(cls)
-                if each.name in variables
-            }
-        )
+        known = METHOD_DEFAULTS.keys() & variables.keys()
+        return cls(**{name: variables[name] for name in known})
 
     def read_options(self) -> Recipe:
         """Options of `szlib.read_tracks`; raises DataError where `reading` holds something else."""
@@ -133,10 +133,9 @@ def check_parameters(
             "reading": ZoneMethod(reading=given["reading"]).read_options().as_json(),
         }
     defaults: dict[str, list[Any]] = {}
-    for name, value in (
-        each for notebook in notebooks for each in read_defaults(notebook).items()
-    ):
-        defaults.setdefault(name, []).append(value)
+    for notebook in notebooks:
+        for name, value in read_defaults(notebook).items():
+            defaults.setdefault(name, []).append(value)
     if unknown := sorted(given.keys() - defaults.keys()):
         raise DataError(
             f"unknown parameter {', '.join(map(ascii, unknown))}; the notebooks know "

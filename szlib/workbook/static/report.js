@@ -5,6 +5,21 @@
     const fold = document.getElementById(decodeURIComponent(hash.slice(1)))?.closest("details");
     if (fold) fold.open = true;
   };
+  // Shows the first player of each scenario in the answer, too: its script plays every figure that is new.
+  const shown = document.querySelector(".players");
+  for (const [title, name] of Object.entries(JSON.parse(shown.dataset.scenarios))) {
+    const canvas = [...document.querySelectorAll("figure.szlib-player canvas")].find((each) => each.ariaLabel?.startsWith(`${title}:`));
+    if (!canvas) continue;
+    shown.parentElement.hidden = false;
+    const found = canvas.closest("figure"), script = document.createElement("script"), place = document.createElement("div");
+    const figure = Object.assign(document.createElement("figure"), { className: found.className });
+    figure.dataset.run = found.dataset.run;
+    const text = name.replaceAll("_", " ");
+    place.append(Object.assign(document.createElement("p"), { textContent: text[0].toUpperCase() + text.slice(1) }), figure);
+    shown.append(place);
+    script.textContent = found.nextElementSibling.textContent;
+    place.append(script);
+  }
   // Aligns columns of numbers, with their headers, to the right.
   for (const table of document.querySelectorAll("table")) {
     const rows = [...table.tBodies].flatMap((body) => [...body.rows]).map((row) => [...row.cells]);
