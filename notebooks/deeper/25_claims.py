@@ -49,8 +49,6 @@ resamples = 200  # for the intervals
 import sys
 
 sys.path.append("..")  # for `plots` and `studies`
-import contextlib
-import io
 import warnings
 from dataclasses import replace
 from functools import partial
@@ -403,8 +401,7 @@ fold_table("The same for each quantity", by_estimator.rename(columns=columns).un
 
 # %% jupyter={"source_hidden": true}
 # Checks
-with contextlib.redirect_stderr(io.StringIO()):  # the table of the row that is computed again
-    on_plazas = record.committed_table("25_plazas", plazas_study.recompute, where="pairs == 150")
+on_plazas = record.committed_table("25_plazas", plazas_study.recompute, where="pairs == 150")
 on_plazas = on_plazas[on_plazas["pairs"] > 150]
 weighted = on_plazas.assign(held=on_plazas["held"] * on_plazas["plazas"], within=on_plazas["worst"] <= 0.035)
 bars = weighted.groupby(["method", "quantity"]).agg(

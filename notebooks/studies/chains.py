@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies.paper_claims import count_claims, drive
 
-from szlib import MPCCBF, SCENARIOS, Ellipse, MPCSettings, simulate
+from szlib import SCENARIOS, Ellipse, MPCSettings
 
 Chain = tuple[Ellipse, MPCSettings]
 """What decides a run of a scenario: the zone, and the settings of the controller."""
@@ -57,11 +58,10 @@ def compare_chains(paper: Chain, ours: Chain, *, names: Iterable[str] = tuple(SC
 
 def drive_chain(name: str, zone: Ellipse, settings: MPCSettings) -> dict[str, Any]:
     """A run of a scenario in numbers, and how many of the paper's claims hold."""
-    scenario = SCENARIOS[name]
-    log = simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings))
-    metrics, held = log.metrics(), [claim.check(log)[0] for claim in scenario.claims]
+    run = drive(SCENARIOS[name], zone, settings)
+    metrics, (held, claims) = run.metrics(), count_claims(run)
     shown = {column: metrics[column] for column in (*RESOLUTION, "passing_side")}
-    return {**shown, "claims_held": sum(held), "claims": len(held)}
+    return {**shown, "claims_held": held, "claims": claims}
 
 
 def differs(row: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

@@ -21,15 +21,15 @@ import pandas as pd
 from scipy.stats import binomtest, chi2
 
 from szlib.control.mpc import MPCCBF
+from szlib.control.settings import MPCSettings
 from szlib.core.checks import check_columns
 from szlib.core.errors import DataError, ZoneError
 from szlib.encounters.kinds import OPPOSITE
 from szlib.encounters.null_model import NullEncounters
 from szlib.simulation.catalogue import SCENARIOS
 from szlib.simulation.closed_loop import simulate
-from szlib.simulation.metrics import compute_metrics
 from szlib.simulation.robot_run import Run
-from szlib.simulation.scenario import Claim
+from szlib.simulation.scenario import Claim, Scenario
 from szlib.workbook.claims import judge_effect
 from szlib.workbook.record import NotebookRecord
 from szlib.zones.ellipses import Ellipse
@@ -254,36 +254,27 @@ def measure_delay_by_size(
     return Finding(claim, mean, low, high, "s", len(delays), interval=RANGE)
 
 
+def drive(scenario: Scenario, zone: Ellipse, settings: MPCSettings) -> Run:
+    """The run of a `scenario` with the controller of szlib."""
+    return simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings))
+
+
 def run_scenario(name: str, zone: Ellipse) -> dict[str, float]:
     """Metrics of the paper's scenario of this `name` with a `zone` and szlib's default settings."""
-    scenario = replace(SCENARIOS[name], claims=())
-    return simulate(scenario, MPCCBF(zone, walls=scenario.walls)).metrics()
+    return drive(replace(SCENARIOS[name], claims=()), zone, MPCSettings()).metrics()
 
 
-def describe_run(run: Run, claims: Mapping[str, tuple[bool, float]]) -> str:
-    """Describe a `run` of a scenario: its numbers, and which of the `claims` hold, by their texts."""
-    found = compute_metrics(run)
-    arrival = f"reaches its goal after {found['time_to_goal']:.1f} s" if run.success else "does not arrive"
-    held, failed = (
-        [text for text, (holds, _) in claims.items() if holds == wanted] for wanted in (True, False)
-    )
-    parts = [
-        f"The robot {arrival}. Its least h is {found['min_h']:.2f} m, its least speed "
-        f"{found['min_speed']:.2f} m/s, its side {found['passing_side']}.",
-        f"Claims of the paper that hold: {' '.join(held) or 'none.'}",
-        f"Claims that do not hold: {' '.join(failed) or 'none.'}",
-    ]
-    return " ".join(parts)
+def count_claims(run: Run) -> tuple[int, int]:
+    """How many of the paper's claims about its scenario hold in a `run`, and how many there are."""
+    held = [claim.check(run)[0] for claim in run.scenario.claims]
+    return sum(held), len(held)
 
 
-def record_claims(
-    record: NotebookRecord, claims: Iterable[Claim], run: Run, *, prefix: str = ""
-) -> dict[str, tuple[bool, float]]:
-    """Record which `claims` hold in a `run`, with their numbers and units; return the results by their texts."""
-    results = {claim.text: claim.check(run) for claim in claims}
-    for text, (holds, number) in results.items():
-        record.claim(prefix + text, holds, UNITS[text].format(number))
-    return results
+def record_claims(record: NotebookRecord, claims: Iterable[Claim], run: Run, *, prefix: str = "") -> None:
+    """Record which `claims` of the paper hold in a `run`, with their numbers and units."""
+    for claim in claims:
+        holds, number = claim.check(run)
+        record.claim(prefix + claim.text, holds, UNITS[claim.text].format(number))
 
 
 def _read_interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, float, float]:

@@ -14,8 +14,8 @@ import plots
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pandas.io.formats.style import Styler
-from studies import paper_claims
 from studies.lesson_zones import choose_paper_zone, choose_zone
+from studies.paper_claims import count_claims, drive, record_claims
 
 import szlib
 from szlib.control.settings import TOLERANCE
@@ -50,12 +50,8 @@ class ScenarioRuns:
     ours: Run
     atc: Run
 
-    def by_name(self) -> dict[str, Run]:
-        """The runs that figures show, by their names."""
-        return {PAPERS: self.paper, OURS: self.ours}
-
     def all_by_name(self) -> dict[str, Run]:
-        """The runs that tables show, by their names."""
+        """The runs by their names; figures show those of `STYLES`."""
         return {PAPERS: self.paper, ON_ATC: self.atc, OURS: self.ours}
 
 
@@ -63,11 +59,6 @@ def paper_settings(settings: szlib.MPCSettings) -> szlib.MPCSettings:
     """The paper's controller with gamma, N, N_h and a_max of ours: the paper gives none of gamma and a_max."""
     same = {name: getattr(settings, name) for name in ("gamma", "N", "N_h", "a_max")}
     return szlib.MPCSettings.paper(**same)
-
-
-def drive(scenario: Scenario, zone: szlib.Ellipse, settings: szlib.MPCSettings) -> Run:
-    """The run of a `scenario` with the controller of szlib."""
-    return szlib.simulate(scenario, szlib.MPCCBF(zone, walls=scenario.walls, settings=settings))
 
 
 def drive_both(record: NotebookRecord, scenario: Scenario, settings: szlib.MPCSettings) -> ScenarioRuns:
@@ -107,36 +98,32 @@ def tabulate_five(runs: Mapping[str, Run]) -> pd.DataFrame:
     rows = {name: [metrics[key] for key in FIVE_NUMBERS] for name, metrics in found.items()}
     table = pd.DataFrame.from_dict(rows, orient="index", columns=list(FIVE_NUMBERS.values())).round(2)
     table["side"] = [metrics["passing_side"] for metrics in found.values()]
-    held = {name: [claim.check(run)[0] for claim in run.scenario.claims] for name, run in runs.items()}
-    table["claims that hold"] = [f"{sum(each)} of {len(each)}" for each in held.values()]
+    table["claims that hold"] = ["{} of {}".format(*count_claims(run)) for run in runs.values()]
     return table
 
 
 def record_safety(record: NotebookRecord, runs: ScenarioRuns, prefix: str = "") -> None:
     """Record what must hold for our run with any zone that leaves the scene passable, and what the paper's do."""
     found = runs.ours.metrics()
-    checks = {
-        "the goal is reached": (found["success"], f"after {found['time_to_goal']:.1f} s"),
-        "h >= 0 at every step": (found["min_h"] >= 0, f"least h {found['min_h']:.2f} m"),
-        "no infeasible step": (found["infeasible_steps"] == 0, f"{found['infeasible_steps']} steps"),
-        "nothing is touched (Euclidean)": (
+    for text, holds, evidence in (
+        ("the goal is reached", found["success"], "after {time_to_goal:.1f} s"),
+        ("h >= 0 at every step", found["min_h"] >= 0, "least h {min_h:.2f} m"),
+        ("no infeasible step", found["infeasible_steps"] == 0, "{infeasible_steps} steps"),
+        (
+            "nothing is touched (Euclidean)",
             found["min_clearance"] > 0,
-            f"least clearance {found['min_clearance']:.2f} m",
+            "least clearance {min_clearance:.2f} m",
         ),
-        "never faster than 1 m/s": (
-            found["max_speed"] <= 1 + 1e-6,
-            f"greatest speed {found['max_speed']:.2f} m/s",
-        ),
-    }
-    for text, (holds, evidence) in checks.items():
-        record.check(prefix + text, holds, evidence)
+        ("never faster than 1 m/s", found["max_speed"] <= 1 + 1e-6, "greatest speed {max_speed:.2f} m/s"),
+    ):
+        record.check(prefix + text, holds, evidence.format_map(found))
     for name, run in {PAPERS: runs.paper, ON_ATC: runs.atc}.items():
         paper = run.metrics()
         is_safe = paper["min_h"] >= -TOLERANCE and paper["min_clearance"] > 0
         evidence = (
-            f"goal after {paper['time_to_goal']:.1f} s, least h {paper['min_h']:.2f} m, least clearance "
-            f"{paper['min_clearance']:.2f} m, side {paper['passing_side']}"
-        )
+            "goal after {time_to_goal:.1f} s, least h {min_h:.2f} m, least clearance "
+            "{min_clearance:.2f} m, side {passing_side}"
+        ).format_map(paper)
         record.claim(f"{prefix}{name}: safe, and at its goal", is_safe and paper["success"], evidence)
     honest = runs.paper.metrics()["unflagged_violations"]
     text = f"{prefix}the paper's chain: no step that called itself safe led to h < 0"
@@ -146,9 +133,8 @@ def record_safety(record: NotebookRecord, runs: ScenarioRuns, prefix: str = "") 
 
 def record_both_claims(record: NotebookRecord, runs: ScenarioRuns, prefix: str = "") -> None:
     """Record the claims of the paper about a scenario, for the paper's chain and for ours."""
-    claims = runs.ours.scenario.claims
-    paper_claims.record_claims(record, claims, runs.paper, prefix=prefix)
-    paper_claims.record_claims(record, claims, runs.ours, prefix=f"{prefix}ours: ")
+    for name, run in {"": runs.paper, "ours: ": runs.ours}.items():
+        record_claims(record, run.scenario.claims, run, prefix=f"{prefix}{name}")
 
 
 def draw_paths_and_speeds(runs: ScenarioRuns, title: str) -> Figure:
@@ -159,8 +145,8 @@ def draw_paths_and_speeds(runs: ScenarioRuns, title: str) -> Figure:
     left.get_legend().remove()
     figures.add_shared_legend((left,))
     left.set_title("Paths, and the zone at the start")
-    for name, run in runs.by_name().items():
-        line, colour = STYLES[name]
+    for name, (line, colour) in STYLES.items():
+        run = runs.all_by_name()[name]
         right.plot(run.time, run.speed, line, color=colour)
     right.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, 1.1), title="Speeds")
     figure.suptitle(title)
@@ -170,8 +156,8 @@ def draw_paths_and_speeds(runs: ScenarioRuns, title: str) -> Figure:
 def draw_space_time(ax: Axes, runs: ScenarioRuns, title: str) -> None:
     """Draw x over time of both robots and of the person with the zone, and the passage as a band."""
     ax.axhspan(*PASSAGE, color=figures.GREY, alpha=0.25, lw=0, label="inside the passage")
-    for name, run in runs.by_name().items():
-        line, colour = STYLES[name]
+    for name, (line, colour) in STYLES.items():
+        run = runs.all_by_name()[name]
         ax.plot(run.time, run.states[:, 0], line, color=colour, linewidth=2, label=f"robot, {name}")
     time, x, reach = runs.ours.time, runs.ours.people[:, 0, 0], runs.ours.zones[0].semi_axes[0]
     ax.plot(time, x, ":", color=figures.RED, linewidth=2, label="person")

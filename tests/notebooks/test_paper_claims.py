@@ -396,23 +396,6 @@ def test_a_run_differs_in_a_number_a_side_or_a_claim(
     assert not chains_study.differs(stuck, stuck)
 
 
-def test_a_run_is_described_with_its_claims() -> None:
-    scenario = szlib.SCENARIOS["passing"]
-    late = szlib.simulate(scenario, szlib.MPCCBF(TILTED), max_time=4.0)
-    text = claims.describe_run(
-        late, {"It goes on.": (False, np.nan), "It waits.": (True, 2.0)}
-    )
-    assert text.startswith("The robot does not arrive. Its least h is ")
-    assert text.endswith(
-        "Claims of the paper that hold: It waits. Claims that do not hold: It goes on."
-    )
-    arrived = claims.describe_run(
-        szlib.simulate(scenario, szlib.MPCCBF(TILTED)), {"It waits.": (True, 2.0)}
-    )
-    assert "goal after 10." in arrived and "its side right" in arrived
-    assert arrived.endswith("Claims that do not hold: none.")
-
-
 def test_the_interval_of_a_rate_is_exact() -> None:
     """Of 10 encounters seen, the mean is 4.795 to 18.39 (Garwood, Biometrika 28, 1936)."""
     days = 10 / claims.PAPER_RATE * 8  # an eighth of the paper's rate
