@@ -155,7 +155,7 @@ record.figure(fig, "claims")
 record.table(table, "25_claims")
 for each, method in zip(found, methods, strict=True):
     name = each.claim if method == "-" else f"{each.claim} ({method})"
-    record.claim(name, each.verdict, str(each))
+    record.claim(name, each.verdict.partition(" with")[0], str(each))
 if record.cache.is_synthetic:
     settings = szlib.PlazaSettings()
     close = samples[samples["distance"] <= r_max]
@@ -688,7 +688,8 @@ asked = {name for names in paper_sentences.load_sentences()["held_by"] for name 
 for row in everywhere.to_dict("records"):
     where = row["data"] if row["method"] == "-" else f"{row['data']}, {row['method']}"
     if f"{record.name[:2]}: {where}: {row['claim']}" in asked:
-        record.claim(f"{where}: {row['claim']}", row["verdict"], claims.format_finding(row))
+        verdict = row["verdict"].partition(" with")[0]
+        record.claim(f"{where}: {row['claim']}", verdict, claims.format_finding(row))
 about_zones = answers[answers["claim"].isin(claims_study.CLAIMS)]
 decided = about_zones[~about_zones["verdict"].str.startswith("not decidable")]["data"].value_counts()
 for name, site in {
