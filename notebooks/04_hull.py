@@ -76,6 +76,7 @@ fit = {"r_max": r_max, "speeds": sorted({*speeds, zone_speed}), "n_resamples": 0
 zone = szlib.SocialZone.fit(samples, method="paper", **fit)
 points = np.column_stack([outliers.complementary_points(inliers, r_max=r_max), inliers["speed"]])
 fig = plt.figure(figsize=(11, 4.1), layout="constrained")
+fig.get_layout_engine().set(wspace=0.08)  # room for the label of the speed
 left, right = fig.add_subplot(1, 2, 1, projection="3d"), fig.add_subplot(1, 2, 2)
 plots.plot_hull(zone, list(zone.ellipses), points=points, ax=left)
 left.set_title(

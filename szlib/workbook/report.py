@@ -133,7 +133,7 @@ def _render_front_page(
     speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
     is_synthetic = summary["data"] == datasets.SYNTHETIC
     outcomes = {
-        name: _format_outcome(name, outcome)
+        name: _complete_outcome(name, outcome)
         for name, outcome in summary["notebooks"].items()
     }
     for name, notebook in notebooks.items():
@@ -175,8 +175,8 @@ def _list_stages(samples: Path) -> list[dict[str, Any]]:
     return table.to_dict("records")  # type: ignore[return-value]
 
 
-def _format_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
-    """The outcome of the notebook `name` with its numbers as texts."""
+def _complete_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
+    """The outcome of the notebook `name`; each check has its notebook and its key, "NN: name"."""
     number = name.split("_")[0]
     checks = [
         {"notebook": name, "key": f"{number}: {check['name']}", **check}

@@ -33,8 +33,8 @@ from ..core.parallel import limit_jobs, safe_path
 from ..tracks import datasets, funnels
 from . import folders
 from .execution import EMPTY_RECORD, execute_notebook
-from .record.data_cache import DataCache, describe_missing_data
-from .record.parameters import check_parameters
+from .record.data_cache import DataCache, describe_missing_data, read_stored_zone
+from .record.parameters import METHOD_DEFAULTS, check_parameters
 
 # The notebooks whose results later ones need (the encounters, the zone), and those that read all records.
 PRODUCERS, SUMMARIES = ("02", "05"), ("28",)
@@ -89,12 +89,15 @@ def run(
     data = folders.absolute_data(data)
     home = folders.claim_results(root, data, given)
     with folder_lock(home), safe_path():
-        cache = DataCache.from_variables(home, given | {"data": data}, [])
-        contents = [[file.name, *file_content(file)] for file in cache.files()]
+        files = DataCache(home, data, seed=given.get("seed", 0)).files()
+        contents = [[file.name, *file_content(file)] for file in files]
         source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
         source |= {"files": contents, "parameters": given}
         names = [script.stem for script in scripts]
-        outcomes = _stored_outcomes(home, source) | dict.fromkeys(names, NOT_STARTED)
+        known = {script.stem for script in folders.list_notebooks(place)}
+        stored = _stored_outcomes(home, source)
+        outcomes = {name: stored[name] for name in stored.keys() & known}
+        outcomes |= dict.fromkeys(names, NOT_STARTED)
         write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
         folders.remove_outputs(home, names)
         unfinished = {**source, "passed": False, "notebooks": outcomes}
@@ -103,7 +106,7 @@ def run(
         for name, outcome in _execute_all(scripts, variables, home, jobs, figures):
             outcomes[name] = outcome
             _store(home, unfinished)
-        source |= _describe_machine() | _describe_data(cache, outcomes)
+        source |= _describe_machine() | _describe_data(home, source, outcomes)
         summary = _store(home, _summarise(source, outcomes))
         if any((home / f"{name}.ipynb").exists() for name in outcomes):
             # importing it takes longer than all other imports
@@ -124,12 +127,15 @@ def _describe_machine() -> dict[str, Any]:
     }
 
 
-def _describe_data(cache: DataCache, outcomes: Mapping[str, Any]) -> dict[str, Any]:
-    """Area, warnings and verdict of the data of a run, from its stored encounters and zone."""
+def _describe_data(
+    home: Path, source: Mapping[str, Any], outcomes: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Area, warnings and verdict of the data of a run, from the encounters and the zone in `home`."""
     found, verdict = dict[str, Any](), ""
-    samples = Path(cache.folder) / "encounters.parquet"
-    if zone := cache.stored_zone():
-        speed = cache.method.zone_speed
+    zone, samples = read_stored_zone(home / "zone.json"), home / "encounters.parquet"
+    if zone and zone.provenance.get("source", {}).get("files") == source["files"]:
+        default = METHOD_DEFAULTS["zone_speed"]
+        speed = source["parameters"].get("zone_speed", default)
         verdict = f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
     if samples.exists():
         table = pd.read_parquet(samples, columns=[])

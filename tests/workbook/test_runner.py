@@ -161,6 +161,30 @@ def test_stored_zone_of_another_version_is_no_obstacle(notebooks, tmp_path, caps
 
 
 @pytest.mark.usefixtures("without_kernels")
+def test_a_notebook_that_is_gone_fails_no_later_run(notebooks, tmp_path):
+    folder = notebooks(_01_good="", _02_bad='record.check("fine", False)')
+    assert run() == 1
+    (folder / "02_bad.py").unlink()
+    assert run() == 0
+    assert list(summary(tmp_path)["notebooks"]) == ["01_good"]
+
+
+@pytest.mark.usefixtures("without_kernels")
+@pytest.mark.parametrize("change", ["write_text('t,id,x,y')", "unlink()"])
+def test_data_that_changes_at_the_end_of_a_run_loses_no_summary(
+    notebooks, tmp_path, change
+):
+    """A zone is judged against the data that the run began with."""
+    file = tmp_path / "mine.csv"
+    notebooks(
+        _05_zone=ZONE,
+        _07_last=f"from pathlib import Path; Path({str(file)!r}).{change}",
+    )
+    assert run() == 0
+    assert "zone at" in summary(tmp_path)["verdict"]
+
+
+@pytest.mark.usefixtures("without_kernels")
 def test_with_changed_parameters_only_checks_that_always_hold_fail_the_run(
     notebooks, tmp_path, capsys
 ):

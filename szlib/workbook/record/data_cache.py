@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import io
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -79,15 +78,6 @@ class DataCache:
     method: ZoneMethod = field(default_factory=ZoneMethod)
     contents: list[list[Any]] = field(default_factory=list, repr=False)
 
-    @classmethod
-    def from_variables(
-        cls, folder: Path, variables: Mapping[str, Any], contents: list[list[Any]]
-    ) -> DataCache:
-        """The cache in a `folder` for the `variables` of a notebook; `contents` as of the class."""
-        area, seed = variables.get("area", ""), variables.get("seed", 0)
-        method = ZoneMethod.from_variables(variables)
-        return cls(folder, variables["data"], area, seed, method, contents)
-
     @property
     def is_synthetic(self) -> bool:
         """Whether the data is the synthetic plaza, whose true zone is known."""
@@ -160,16 +150,10 @@ class DataCache:
 
     def zone(self) -> SocialZone:
         """The zone that notebook 05 stored, or the same fitted now."""
-        return self.stored_zone() or self.fit_zone()
-
-    def stored_zone(self) -> SocialZone | None:
-        """The stored zone, if it was made from the same data and parameters, and is not damaged."""
-        file, source = self._path("zone.json"), self._zone_source()
-        zone = None if load_cached(file, source) is None else read_stored_zone(file)
-        is_same = zone and zone.provenance.get("source") == json.loads(
-            json.dumps(source)
-        )
-        return zone if is_same else None
+        file = self._path("zone.json")
+        is_current = load_cached(file, self._zone_source()) is not None
+        zone = read_stored_zone(file) if is_current else None
+        return zone or self.fit_zone()
 
     def fit_zone(self) -> SocialZone:
         """Fit the zone, test it against the null model, and store it for later notebooks."""

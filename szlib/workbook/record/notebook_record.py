@@ -35,7 +35,7 @@ from .display import (
     show_figure,
     style_table,
 )
-from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, read_defaults
+from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, read_defaults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,7 +111,9 @@ class NotebookRecord:
             self.out = folders.claim_results(results / folders.LAB, data, given)
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
-        self.cache = DataCache.from_variables(self.out, variables, contents)
+        method, area = ZoneMethod.from_variables(variables), variables.get("area", "")
+        seed = variables.get("seed", 0)
+        self.cache = DataCache(self.out, data, area, seed, method, contents)
         format_outputs()
 
     def check(
