@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -150,10 +151,11 @@ class DataCache:
 
     def zone(self) -> SocialZone:
         """The zone that notebook 05 stored, or the same fitted now."""
-        file = self._path("zone.json")
-        is_current = load_cached(file, self._zone_source()) is not None
-        zone = read_stored_zone(file) if is_current else None
-        return zone or self.fit_zone()
+        file, source = self._path("zone.json"), self._zone_source()
+        zone = read_stored_zone(file) if load_cached(file, source) else None
+        if zone and zone.provenance.get("source") == json.loads(json.dumps(source)):
+            return zone
+        return self.fit_zone()
 
     def fit_zone(self) -> SocialZone:
         """Fit the zone, test it against the null model, and store it for later notebooks."""
