@@ -175,7 +175,7 @@ class RespectEstimator(Estimator):
     def best(self) -> Array:
         """The parameters of the zone; raises ZoneError if no zone fits better than none."""
         likelihood = Likelihood.of(self.data, self.null)
-        best = likelihood.maximise(likelihood.starts())
+        best = likelihood.find_best(np.random.default_rng(0))
         evidence = 2 * likelihood.power * likelihood.log_ratios(best).sum()
         if evidence < _MIN_EVIDENCE:
             raise ZoneError(

@@ -44,11 +44,14 @@ _PARAMETERS = [
 ]
 _LOW, _HIGH, _MEAN, _SPREAD = np.transpose(_PARAMETERS)
 _REPORTED = 9  # the ellipse, and the share f of careless people
+# Spread of the first draws, as a share of the bounds: the data tells the ellipse better than f, w, A and c.
+_FIRST_SPREAD = np.repeat([0.02, 0.15, 0.05], [8, 1, 3])
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
 _BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
 # number of best circles tried, and the least difference of their radii [m]
 _STARTS, _START_GAP = (3, 0.15)
+_RESTARTS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +105,8 @@ class PairPaths:
         first = np.flatnonzero(np.diff(row, prepend=-1))
         may_be_nearest = np.zeros(len(row), bool)
         for p in _bank():
-            level = _level(x, y, speed, p)[0]
-            may_be_nearest |= level == np.minimum.reduceat(level, first)[row]
+            h = _signed_distances(x, y, speed, p)[0]
+            may_be_nearest |= h == np.minimum.reduceat(h, first)[row]
         kept = row[may_be_nearest]
         names = (
             encounters["kind"].to_numpy(object)
@@ -136,22 +139,20 @@ class PairPaths:
         that follows lines stops there, a chain does not mind.
         """
         x, y, speed = self._coarse if fast else (self.x, self.y, self.speed)
-        level = _level(x, y, speed, p)[0]
-        least = level == np.minimum.reduceat(level, self.first)[self.encounter]
-        at = np.flatnonzero(least)
+        every = _signed_distances(x, y, speed, p)[0]
+        h = np.minimum.reduceat(every, self.first)
+        if not gradient:
+            return h.astype(float), np.empty(0)
+        at = np.flatnonzero(every == h[self.encounter])
         # the first of equal ones
         at = at[np.flatnonzero(np.diff(self.encounter[at], prepend=-1))]
         speed = self.speed[at]
-        level, u, v, log_a, log_b = _level(self.x[at], self.y[at], speed, p)
-        r, scale = np.sqrt(level), np.exp((log_a + log_b) / 2)
-        h = (r - 1) * scale
-        if not gradient:
-            return h, np.empty(0)
-        k = scale / np.maximum(r, 1e-9)
-        by_y = k * v * np.exp(-log_b)
-        by_x = k * u * np.exp(-log_a) - by_y * p[7]
+        h, u, v, by_a, by_b = _signed_distances(self.x[at], self.y[at], speed, p)
+        k = 1 / (np.maximum(np.hypot(u, v), 1e-9) * np.sqrt(by_a * by_b))
+        by_y = k * v * by_b
+        by_x = k * u * by_a - by_y * p[7]
+        shear = -by_y * u / by_a
         by_a, by_b = h / 2 - k * u * u, h / 2 - k * v * v
-        shear = -by_y * u * np.exp(log_a)
         slopes = (
             -by_x,
             -by_x * speed,
@@ -165,15 +166,19 @@ class PairPaths:
         return h, np.stack(slopes, axis=1)
 
 
-def _level(
+def _signed_distances(
     x: Array, y: Array, speed: Array, p: Array
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """The squared norm of points in which the ellipse of `p` is the unit circle, and what it is made of."""
+    """Distances of points to the ellipse of `p` [m], and what they are made of.
+
+    That is the point in the frame in which the ellipse is the unit circle, and the inverse semi-axes. The
+    distance to the circle is multiplied by the geometric mean of the semi-axes.
+    """
     p = p.astype(x.dtype)
-    log_a, log_b = p[3] + p[4] * speed, p[5] + p[6] * speed
+    by_a, by_b = np.exp(-p[3] - p[4] * speed), np.exp(-p[5] - p[6] * speed)
     ahead = x - p[0] - p[1] * speed
-    u, v = ahead * np.exp(-log_a), (y - p[2] - p[7] * ahead) * np.exp(-log_b)
-    return u * u + v * v, u, v, log_a, log_b
+    u, v = ahead * by_a, (y - p[2] - p[7] * ahead) * by_b
+    return (np.sqrt(u * u + v * v) - 1) / np.sqrt(by_a * by_b), u, v, by_a, by_b
 
 
 @cache
@@ -266,6 +271,13 @@ class Likelihood:
             out[of_data] -= np.log(against[of_null].mean())
         return np.asarray(self.weights * out)
 
+    def log_posterior(self, p: Array) -> float:
+        """Log likelihood of the parameters `p` with the priors, up to a constant."""
+        h, h_null = (
+            each.distances(p, fast=self.is_fast)[0] for each in (self.data, self.null)
+        )
+        return float(self.log_ratios(p, (h, h_null)).sum()) - _minus_log_prior(p)[0]
+
     def cost(self, p: Array) -> tuple[float, Array]:
         """Minus the log likelihood of the parameters `p` with the priors, and its gradient."""
         (h, slope), (h_null, slope_null) = (
@@ -301,6 +313,16 @@ class Likelihood:
             ]
         return np.asarray(min(tries, key=lambda found: float(found.fun)).x)
 
+    def find_best(self, rng: np.random.Generator) -> Array:
+        """The maximum: the best of several starts, and of `_RESTARTS` starts around it drawn with `rng`.
+
+        The density has many small peaks, because each encounter adds an edge.
+        """
+        best = self.maximise(self.starts())
+        shifts = rng.normal(size=(_RESTARTS, len(best))) * _FIRST_SPREAD
+        near = np.clip(best + shifts * (_HIGH - _LOW), _LOW, _HIGH)
+        return self.maximise([best, *near])
+
     def starts(self) -> list[Array]:
         """The best circles of a grid of radii, edges and shares."""
         circle = np.zeros(len(_PARAMETERS))
@@ -333,7 +355,15 @@ class Likelihood:
         weights = self.power * self.weights
         tempered = replace(self, weights=weights, is_fast=True)
         with threads().limit(limits=1):
-            return sample(tempered.cost, start, _LOW, _HIGH, rng, n_reported=_REPORTED)
+            return sample(
+                tempered.log_posterior,
+                start,
+                _LOW,
+                _HIGH,
+                rng,
+                spread=_FIRST_SPREAD,
+                n_reported=_REPORTED,
+            )
 
 
 @cache

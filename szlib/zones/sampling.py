@@ -1,39 +1,31 @@
-"""Draws from a posterior density by Hamiltonian Monte Carlo, until several chains agree.
+"""Draws from a posterior density by several ensembles of walkers, until the ensembles agree.
 
-Each chain follows the gradient, so that its draws are nearly independent (Neal, "MCMC using Hamiltonian
-dynamics", 2011). Parameters have bounds, and are drawn on the whole real line by a logit. The steps fit the
-curvature at the maximum, then the covariance of the draws so far. The chains end when the largest R-hat is
-below 1.01 and each parameter that is reported has 400 effective draws (Vehtari et al., Bayesian Analysis 16,
-2021), or after `_MOST_BLOCKS` blocks.
+Each walker of an ensemble steps along the difference of two others, so that steps fit the density without a
+gradient or a covariance (differential evolution; Ter Braak, Statistics and Computing 16, 2006). emcee moves
+the walkers (Foreman-Mackey et al., PASP 125, 2013). The ensembles do not know each other. They end when the
+largest R-hat is below 1.01 and each parameter that is reported has 400 effective draws (Vehtari et al.,
+Bayesian Analysis 16, 2021), or after `_MOST_BLOCKS` blocks.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import emcee
 import numpy as np
-from scipy.special import expit, logit
 
 from ..core.checks import Array
 
-Cost = Callable[[Array], tuple[float, Array]]
-
 R_HAT, EFFECTIVE = 1.01, 400
-_CHAINS, _BLOCK, _MOST_BLOCKS = 4, 60, 24
-_ADAPTING = 4  # blocks before the first draw; the last one adapts the step only
-_STEPS = (3, 10)  # of the leapfrog, least and less than
-_ACCEPTED, _RATE = (
-    0.8,
-    0.1,
-)  # share of proposals aimed at, and how fast the step follows it
-_DIFFERENCE = 1e-3  # for the curvature
+_ENSEMBLES, _WALKERS = 4, 5  # walkers for each parameter
+_BURN_IN, _BLOCK, _MOST_BLOCKS = 60, 40, 12  # steps; blocks
+_MOVES = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Draws of all chains.
+    """Draws of all walkers.
 
     Parameters
     ----------
@@ -47,144 +39,91 @@ class Draws:
 
     @property
     def has_converged(self) -> bool:
-        """Whether the chains agree and are long enough."""
+        """Whether the ensembles agree and are long enough."""
         return self.r_hat < R_HAT and self.n_effective >= EFFECTIVE
 
 
-class _Space:
-    """The density on the whole real line, in units of a linear map `root` around a centre."""
-
-    def __init__(self, cost: Cost, start: Array, low: Array, high: Array) -> None:
-        self.cost, self.low, self.high = cost, low, high
-        share = np.clip((start - low) / (high - low), 0.01, 0.99)
-        self.center = np.asarray(logit(share))
-        self.root: Array = np.eye(len(start))
-
-    def parameters(self, z: Array) -> Array:
-        """The parameters at `z` (..., d)."""
-        return np.asarray(
-            self.low + (self.high - self.low) * expit(self.center + z @ self.root.T)
-        )
-
-    def energy(self, z: Array) -> tuple[float, Array]:
-        """Minus the logarithm of the density at `z` (d,), and its gradient."""
-        share = expit(self.center + self.root @ z)
-        inner = np.maximum(share * (1 - share), 1e-12)
-        width = self.high - self.low
-        value, slope = self.cost(self.low + width * share)
-        slope = slope * width * inner - (1 - 2 * share)
-        return float(value - np.log(inner).sum()), slope @ self.root
-
-    def fit_curvature(self) -> None:
-        """Choose the map from the curvature at the centre."""
-        d = len(self.center)
-        steps = _DIFFERENCE * np.eye(d)
-        sides = [[self.energy(sign * step)[1] for sign in (1, -1)] for step in steps]
-        curvature = np.array([up - down for up, down in sides]) / (2 * _DIFFERENCE)
-        values, vectors = np.linalg.eigh((curvature + curvature.T) / 2)
-        self.root = np.asarray(vectors / np.sqrt(np.maximum(np.abs(values), 0.3)))
-
-    def fit_draws(self, u: Array) -> None:
-        """Choose centre and map from draws `u` (k, d) on the real line."""
-        self.center = np.asarray(u.mean(axis=0))
-        covariance = np.cov(u.T) + 1e-6 * np.eye(u.shape[1])
-        self.root = np.asarray(np.linalg.cholesky(covariance))
-
-
 def sample(
-    cost: Cost,
+    log_density: Callable[[Array], float],
     start: Array,
     low: Array,
     high: Array,
     rng: np.random.Generator,
     *,
+    spread: Array,
     n_reported: int,
 ) -> Draws:
-    """Draw from the density exp(-cost) between bounds.
+    """Draw from a density between bounds.
 
     Parameters
     ----------
-    cost : gives minus the logarithm of the density at parameters (d,), up to a constant, and its gradient.
+    log_density : the logarithm of the density at parameters (d,), up to a constant.
     start : the maximum of the density, or near it, shape (d,).
     low, high : bounds of the parameters, shape (d,).
     rng : of the draws.
-    n_reported : the chains must agree about so many parameters, the first ones.
+    spread : standard deviation of the first walkers around the start, as a share of the bounds, shape (d,).
+    n_reported : the ensembles must agree about so many parameters, the first ones.
     """
-    space = _Space(cost, np.asarray(start, float), low, high)
-    space.fit_curvature()
-    z = rng.normal(0, 1, (_CHAINS, len(start)))
-    step = 0.3
-    for block in range(_ADAPTING):
-        chains, step = _run(space, z, step, rng, adapts=True)
-        u = space.center + chains @ space.root.T
-        if block < _ADAPTING - 1:
-            space.fit_draws(u[:, _BLOCK // 3 :].reshape(-1, len(start)))
-        z = np.linalg.solve(space.root, (u[:, -1] - space.center).T).T
-    blocks: list[Array] = []
-    while len(blocks) < _MOST_BLOCKS:
-        chains, step = _run(space, z, step, rng)
-        z = chains[:, -1]
-        blocks.append(chains)
-        draws = np.concatenate(blocks, axis=1)
-        found = Draws(space.parameters(draws), *diagnose(draws[..., :n_reported]))
+
+    def log_inside(p: Array) -> float:
+        is_inside = bool(((low < p) & (p < high)).all())
+        return log_density(p) if is_inside else -np.inf
+
+    d = len(start)
+    ensembles = [
+        emcee.EnsembleSampler(_WALKERS * d, d, log_inside, moves=_MOVES)
+        for _ in range(_ENSEMBLES)
+    ]
+    for ensemble in ensembles:
+        shift = spread * rng.normal(size=(_WALKERS * d, d))
+        edge = spread * rng.uniform(size=shift.shape)
+        share = np.clip((start - low) / (high - low) + shift, edge, 1 - edge)
+        seed = np.random.RandomState(rng.integers(2**31)).get_state()
+        first = emcee.State(low + (high - low) * share, random_state=seed)
+        ensemble.run_mcmc(first, _BURN_IN)
+        ensemble.reset()
+    for _ in range(_MOST_BLOCKS):
+        for ensemble in ensembles:
+            ensemble.run_mcmc(None, _BLOCK)
+        # by ensemble, step, walker and parameter
+        draws = np.stack([ensemble.get_chain() for ensemble in ensembles])
+        found = Draws(draws.reshape(-1, d), *diagnose(draws[..., :n_reported]))
         if found.has_converged:
             break
-    return Draws(found.values.reshape(-1, len(start)), found.r_hat, found.n_effective)
+    return found
 
 
-def _run(
-    space: _Space,
-    z: Array,
-    step: float,
-    rng: np.random.Generator,
-    *,
-    adapts: bool = False,
-) -> tuple[Array, float]:
-    """One block of each chain from `z` (chains, d): its draws (chains, n, d), and the step."""
-    out = np.empty((len(z), _BLOCK, z.shape[1]))
-    for chain, at in enumerate(z):
-        energy, slope = space.energy(at)
-        for k in range(_BLOCK):
-            momentum = rng.normal(size=len(at))
-            there, speed, value, force = at, momentum, energy, slope
-            for _ in range(rng.integers(*_STEPS)):
-                speed = speed - step / 2 * force
-                there = there + step * speed
-                value, force = space.energy(there)
-                speed = speed - step / 2 * force
-            gain = float(energy - value) + (momentum @ momentum - speed @ speed) / 2
-            accepted = math.exp(min(float(gain), 0.0)) if math.isfinite(gain) else 0.0
-            if rng.random() < accepted:
-                at, energy, slope = there, value, force
-            if adapts:
-                step *= np.exp(_RATE * (accepted - _ACCEPTED))
-            out[chain, k] = at
-    return out, step
+def diagnose(draws: Array) -> tuple[float, float]:
+    """The largest split R-hat, and the fewest effective draws, over the parameters.
 
-
-def diagnose(chains: Array) -> tuple[float, float]:
-    """The largest split R-hat, and the fewest effective draws, over the parameters of `chains` (m, n, d).
+    Parameters
+    ----------
+    draws : by ensemble, step, walker and parameter, shape (m, n, w, d). R-hat compares the ensembles, each
+        split in two halves. Autocorrelation is that of the walkers.
 
     Examples
     --------
     >>> import numpy as np
     >>> from szlib.zones.sampling import diagnose
-    >>> r_hat, n = diagnose(np.random.default_rng(0).normal(size=(4, 500, 2)))
-    >>> r_hat < 1.01, n > 1000
+    >>> r_hat, n = diagnose(np.random.default_rng(0).normal(size=(4, 500, 10, 2)))
+    >>> r_hat < 1.01, n > 10_000
     (True, True)
     """
-    half = chains.shape[1] // 2
-    split = np.concatenate([chains[:, :half], chains[:, half : 2 * half]])
-    m, n, _ = split.shape
-    within = split.var(axis=1, ddof=1).mean(axis=0)
-    total = (n - 1) / n * within + split.mean(axis=1).var(axis=0, ddof=1)
-    centred = split - split.mean(axis=1, keepdims=True)
+    m, n, w, d = draws.shape
+    halves = draws[:, : n // 2 * 2].reshape(2 * m, -1, d)
+    within = halves.var(axis=1, ddof=1).mean(axis=0)
+    between = halves.mean(axis=1).var(axis=0, ddof=1)
+    r_hat = np.sqrt(1 + between / within).max()
+
+    walkers = draws.transpose(0, 2, 1, 3).reshape(m * w, n, d)
+    spread = walkers.var(axis=1, ddof=1).mean(axis=0)
+    total = (n - 1) / n * spread + walkers.mean(axis=1).var(axis=0, ddof=1)
+    centred = walkers - walkers.mean(axis=1, keepdims=True)
     spectrum = np.abs(np.fft.rfft(centred, 2 * n, axis=1)) ** 2
     covariance = np.fft.irfft(spectrum, axis=1)[:, :n].mean(axis=0) / n
-    correlation = 1 - (within - covariance * n / (n - 1)) / total
+    correlation = 1 - (spread - covariance * n / (n - 1)) / total
     pairs = correlation[0 : n // 2 * 2 : 2] + correlation[1 : n // 2 * 2 : 2]
-    pairs = np.where(
-        np.cumprod(pairs > 0, axis=0), pairs, 0
-    )  # Geyer's initial positive sequence
-    time = np.maximum(2 * pairs.sum(axis=0) - 1, 1 / np.log10(m * n))
-    return float(np.sqrt(total / within).max()), float((m * n / time).min())
+    # Geyer's initial positive sequence
+    pairs = np.where(np.cumprod(pairs > 0, axis=0), pairs, 0)
+    time = np.maximum(2 * pairs.sum(axis=0) - 1, 1 / np.log10(m * w * n))
+    return float(r_hat), float((m * w * n / time).min())
