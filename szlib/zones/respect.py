@@ -212,11 +212,11 @@ class RespectEstimator(Estimator):
         return self.posterior(speeds)[rng.integers(len(self.draws.values), size=n)]
 
     def has_converged(self) -> bool:
-        """Whether the chains agree and are long enough."""
+        """Whether the ensembles agree and are long enough."""
         return self.draws.has_converged
 
     def describe_posterior(self) -> str:
-        """Number of draws, and how well the chains agree."""
+        """Number of draws, and how well the ensembles agree."""
         found = self.draws
         return (
             f"{len(found.values)} draws, {found.n_effective:.0f} of them effective, "

@@ -136,7 +136,7 @@ class PairPaths:
 
         With `gradient` also its derivatives by the first eight parameters, shape (k, 8); else an empty array.
         If it must be `fast`, the nearest sample is sought in 32 bits, and h jumps by 1e-7 m: an optimiser
-        that follows lines stops there, a chain does not mind.
+        that follows lines stops there, a draw does not mind.
         """
         x, y, speed = self._coarse if fast else (self.x, self.y, self.speed)
         every = _signed_distances(x, y, speed, p)[0]

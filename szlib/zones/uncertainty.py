@@ -71,7 +71,7 @@ class Uncertainty:
     intervals : speed [m/s], quantity (one of `QUANTITIES`), low, high; NaN if too few resamples have a zone.
         Low and high of an angle may be outside (-90, 90] deg.
     bands : speed [m/s], direction [rad], low, high [m]: distance from the person to the ellipse.
-    has_converged : whether the chains of a posterior agree and are long enough.
+    has_converged : whether the draws of a posterior agree and are enough.
     """
 
     level: float

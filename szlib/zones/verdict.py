@@ -154,9 +154,9 @@ def _place(zone: FittedZone, speed: float) -> Iterator[str]:
 
 
 def _width(zone: FittedZone, speed: float) -> Iterator[str]:
-    """What is wrong with the intervals: missing, of chains that disagree, or too wide."""
+    """What is wrong with the intervals: missing, of draws that disagree, or too wide."""
     if zone.uncertainty is not None and not zone.uncertainty.has_converged:
-        yield f"the chains of the posterior do not agree ({zone.uncertainty.description})"
+        yield f"the draws of the posterior do not agree ({zone.uncertainty.description})"
     for fitted in _neighbours(zone, speed):
         for name, value in zip(
             ("a", "b"), zone.ellipses[fitted].semi_axes, strict=True

@@ -195,7 +195,7 @@ def test_intervals_in_the_wrong_place_or_too_wide_are_undecided(
 def test_chains_that_do_not_agree_are_undecided(careful: szlib.SocialZone) -> None:
     apart = replace(careful.uncertainty, has_converged=False)
     verdict = replace(careful, uncertainty=apart).verdict(SPEED)
-    assert "the chains of the posterior do not agree" in verdict.sentence
+    assert "the draws of the posterior do not agree" in verdict.sentence
 
 
 def test_implausible_data_are_undecided(careful: szlib.SocialZone) -> None:
