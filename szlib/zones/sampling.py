@@ -66,6 +66,7 @@ def sample(
     """
 
     def log_inside(p: Array) -> float:
+        """The logarithm of the density, minus infinity outside the bounds."""
         is_inside = bool(((low < p) & (p < high)).all())
         return log_density(p) if is_inside else -np.inf
 
