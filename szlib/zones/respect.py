@@ -50,8 +50,9 @@ from .sampling import Draws
 # Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
 # a row, for other reasons than respect, which a shift in time removes as well. Who stands has no heading.
 _KINDS = ("opposite", "crossing")
-# Twice the log likelihood ratio of a zone against none: of 400 crowds on straight lines, 1 % have more.
-_MIN_EVIDENCE = 36.0
+# Twice the logarithm of the posterior density of a zone over that of none: of 400 crowds on straight lines,
+# 1 % have more.
+_MIN_EVIDENCE = 20.0
 # encounters drawn from the null model, at least and at most; else two for each
 _NULL_DRAWN = (4000, 8000)
 _NULL_PER_ENCOUNTER = 2  # of the data
@@ -177,11 +178,11 @@ class RespectEstimator(Estimator):
         """The parameters of the zone; raises ZoneError if no zone fits better than none."""
         likelihood = Likelihood.of(self.data, self.null)
         best = likelihood.find_best(np.random.default_rng(0))
-        evidence = 2 * likelihood.power * likelihood.log_ratios(best).sum()
+        evidence = 2 * likelihood.log_posterior(best)
         if evidence < _MIN_EVIDENCE:
             raise ZoneError(
                 "no respect zone: people who ignore each other explain the data nearly as well (twice "
-                f"the log likelihood ratio is {evidence:.1f}, at least {_MIN_EVIDENCE:g} expected); add data"
+                f"the log posterior ratio is {evidence:.1f}, at least {_MIN_EVIDENCE:g} expected); add data"
             )
         return best
 

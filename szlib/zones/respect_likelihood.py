@@ -272,11 +272,12 @@ class Likelihood:
         return np.asarray(self.weights * out)
 
     def log_posterior(self, p: Array) -> float:
-        """Log likelihood of the parameters `p` with the priors, up to a constant."""
+        """Logarithm of the posterior density of the parameters `p`; 0 without a zone."""
         h, h_null = (
             each.distances(p, fast=self.is_fast)[0] for each in (self.data, self.null)
         )
-        return float(self.log_ratios(p, (h, h_null)).sum()) - _minus_log_prior(p)[0]
+        ratio = float(self.log_ratios(p, (h, h_null)).sum())
+        return self.power * ratio - _minus_log_prior(p)[0]
 
     def cost(self, p: Array) -> tuple[float, Array]:
         """Minus the log likelihood of the parameters `p` with the priors, and its gradient."""
@@ -352,11 +353,9 @@ class Likelihood:
 
     def draw(self, start: Array, rng: np.random.Generator) -> Draws:
         """Draw parameters from the posterior around its maximum `start`, with `rng`."""
-        weights = self.power * self.weights
-        tempered = replace(self, weights=weights, is_fast=True)
         with threads().limit(limits=1):
             return sample(
-                tempered.log_posterior,
+                replace(self, is_fast=True).log_posterior,
                 start,
                 _LOW,
                 _HIGH,

@@ -247,13 +247,12 @@ def test_the_posterior_has_the_curvature_of_its_density(
 ) -> None:
     """Of well determined parameters the standard deviation is that of the Gaussian with this curvature."""
     likelihood = Likelihood.of(estimator.data, estimator.null)
-    tempered = replace(likelihood, weights=likelihood.power * likelihood.weights)
     names, step, draws = [3, 5], 0.02, estimator.draws.values
 
     def value(q: np.ndarray) -> float:
         p = draws.mean(axis=0)
         p[names] += q
-        return -tempered.cost(p)[0]
+        return likelihood.log_posterior(p)
 
     grid = np.linspace(-4, 4, 17) * step
     density = np.array([[value(np.array([x, y])) for y in grid] for x in grid])
