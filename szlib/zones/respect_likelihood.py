@@ -27,6 +27,7 @@ _SPEED_BOUNDS = (0.3, 2.0)
 # Columns of the samples: direction of the other person, and speed, of each of the two people.
 VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
 
+EXCESS_PRIOR = (-3.0, 2.0)  # mean and standard deviation of log A
 # Of each parameter: lowest and highest value, mean and standard deviation of its prior.
 _PARAMETERS = [
     (-0.5, 0.5, 0.0, 0.15),  # centre ahead [m]
@@ -39,7 +40,7 @@ _PARAMETERS = [
     (-0.6, 0.6, 0.0, 0.15),  # shear
     (-6.0, 1.5, 0.0, np.inf),  # logit f
     (*np.log([0.015, 0.3, 1.0]), np.inf),  # log w [m]
-    (-5.0, 8.0, -3.0, 2.0),  # log A
+    (-5.0, 8.0, *EXCESS_PRIOR),  # log A
     (*np.log([0.08, 0.6, 1.0]), np.inf),  # log c [m]
 ]
 _LOW, _HIGH, _MEAN, _SPREAD = np.transpose(_PARAMETERS)
@@ -195,18 +196,30 @@ def _bank() -> Array:
     return bank
 
 
-def _factor(h: Array, p: Array) -> tuple[Array, Array, Array, Array]:
-    """g(h) (k,), and what it is made of: the edge, the excess there, and max(h, 0) / c."""
-    f, (w, excess, reach) = expit(p[8]), np.exp(p[9:])
+def respect_factor(
+    h: Array, f: Any, w: Any, excess: Any, reach: Any
+) -> tuple[Array, Array, Array, Array]:
+    """g(h) (see `respect`), and what it is made of: the edge, the excess there, and max(h, 0) / c.
+
+    Parameters
+    ----------
+    h : distance to the edge of the zone [m], negative inside.
+    f, w, excess, reach : share of careless people, softness [m], A and c [m], of shapes that broadcast.
+    """
     s, outside = expit(h / w), np.maximum(h, 0) / reach
     near = excess * np.exp(-outside)
     return f + (1 - f) * s * (1 + near), s, near, outside
 
 
+def _edge(p: Array) -> Array:
+    """The last arguments of `respect_factor` from the parameters `p`."""
+    return np.concatenate([expit(p[8:9]), np.exp(p[9:])])
+
+
 def _factor_and_slopes(h: Array, p: Array) -> tuple[Array, Array, Array]:
     """g(h) (k,), its derivative by h (k,), and by the last four parameters (k, 4)."""
-    g, s, near, outside = _factor(h, p)
-    f, (w, _, reach) = expit(p[8]), np.exp(p[9:])
+    f, w, excess, reach = _edge(p)
+    g, s, near, outside = respect_factor(h, f, w, excess, reach)
     out = (1 - f) * s
     by_h = out * ((1 - s) / w * (1 + near) - near / reach * (h > 0))
     by_f, by_w = f * (1 - f) * (1 - s * (1 + near)), -out * (1 - s) * (1 + near) * h / w
@@ -266,7 +279,10 @@ class Likelihood:
         h, h_null = distances or [
             each.distances(p)[0] for each in (self.data, self.null)
         ]
-        out, against = np.log(_factor(h, p)[0]), _factor(h_null, p)[0]
+        (g, *_), (against, *_) = (
+            respect_factor(each, *_edge(p)) for each in (h, h_null)
+        )
+        out = np.log(g)
         for of_data, of_null in self.kinds:
             out[of_data] -= np.log(against[of_null].mean())
         return np.asarray(self.weights * out)

@@ -18,26 +18,19 @@ train, walk in the same direction as the rest of it, and condition 3 (1 m at the
 without any respect. Shifted alone, they meet people who cross, and these come nearer. With all kinds pooled,
 this mix looked like respect in 17 of 100 simulated crowds; with separate kinds in 1 (notebook 06).
 
-The *radius* of the respect zone, all directions pooled, comes from the same nearest approaches.
-(Estimator "respect" counts every sample instead. A pair that keeps apart takes all its samples away, also
-those far outside of the edge, so that the edge looks soft and is found too far out.)
+The *radius* of the respect zone, all directions pooled, comes from the nearest approach r of each encounter.
+Its likelihood is that of the ellipse (`szlib.zones.respect`), with h = r - R:
 
-Each encounter counts once, with its nearest approach r. Among people who ignore each other, those of the kind
-k have nearest approaches with the frequencies N_k(r) of the null model. Of the people who respect each other,
-few come nearer than the radius R, and a share f ignores others:
+    p(r | k) = N_k(r) g(r - R) / sum over r of N_k g
 
-    p(r | k) = N_k(r) g(r) / sum over r of N_k g,      g(r) = f + (1 - f) / (1 + exp(-(r - R) / w))
-
-w is the softness of the edge. R is the distance at which careful people are half as frequent as in the null
-model. The mix of kinds does not matter, because p is conditional on the kind.
-
-The likelihood is computed for *all* R, f and w of a fine grid, so the best one is not missed and needs no
-start. The interval holds every R with 2 (log L_max - max over f and w of log L) below 3.84, the 95 % quantile
-of chi square with one degree of freedom, times 1 + n/m for n encounters of the data and m of the null model.
-It is meant to contain the true radius. On 180 simulated crowds (single people, pairs, bunches, a rush hour)
-that keep a hard core of 0.5, 0.8 or 1.0 m, 5 % of them careless, it did in 96 %. Where 60 encounters came
-within 2 m, the radius was 2 to 4 cm too large. At Grand Central it is 0.57 to 0.60 m for 150 to 7,354
-encounters.
+R is the distance at which careful people are half as frequent as in the null model, but for those who step
+aside and are seen just outside (A and c). Without them, people who swerve around a circle of 0.8 m seemed to
+keep 0.74 m. The likelihood is computed for *all* R and the rest of a fine grid, so the best one is not missed
+and needs no start; A has the prior of the ellipse. The interval holds every R with 2 (log L_max - max over the
+rest of log L) below 3.84, the 95 % quantile of chi square with one degree of freedom, times 1 + n/m for n
+encounters of the data and m of the null model. Because people differ from the model, it is at least
+`_MODEL_ERROR` wide on both sides. It is meant to contain the true radius. On 30 crowds that swerve around
+circles of 0.5, 0.8 and 1.0 m it does, and R is right to 1 cm.
 """
 
 from __future__ import annotations
@@ -45,6 +38,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -58,6 +52,7 @@ from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
 from ..encounters.pairs import SensorCheck
 from .outliers import R_MAX, nearest_approaches
+from .respect_likelihood import EXCESS_PRIOR, respect_factor
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
@@ -65,11 +60,11 @@ SIGNIFICANCE_LEVEL = 0.05
 _NULL_DRAWS = 5  # shifts that are fitted as if they were data
 # A kind that is expected more often than this and is missing was filtered out on one side only.
 _MIN_EXPECTED = 30
-# Softness of the edge w [m].  Its standard deviation is 1.8 w, at least 6 cm: a sharper edge follows single
-# encounters.
-_SOFTNESS = (0.033, 0.06, 0.1, 0.18, 0.3)
-# f; with a half and more there is no zone
-_IGNORING = (0.0, *expit(np.linspace(-6, 4, 30)).tolist())
+# Softness of the edge w [m]; f, with a half and more there is no zone; A and c [m].
+_SOFTNESS = np.array([0.005, 0.02, 0.06, 0.12, 0.25])
+_IGNORING = np.array([0.0, *expit(np.linspace(-6, 4, 15))])
+_EXCESS = [(0.0, 1.0), *product((0.3, 1.0, 4.0), (0.08, 0.2, 0.5))]
+_MODEL_ERROR = 0.02  # [m]
 _FARTHEST = 0.8  # largest R, in r_max: beyond it people at a distance are hardly seen
 _N_RADII, _N_BINS = 160, 80  # values of R up to there, and bins of r up to r_max
 _LEVEL = 0.95
@@ -151,24 +146,31 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
             "no kind of encounter is in the data and in its null model as well: nothing to compare"
         )
     radii = np.arange(_N_RADII) / _N_RADII * _FARTHEST * r_max
-    edge = expit((r - radii[:, None, None, None]) / np.array(_SOFTNESS)[:, None, None])
-    share = np.array(_IGNORING)[:, None]
-    g = share + (1 - share) * edge  # by R, w, f and r
-    likelihood, careless = np.zeros(g.shape[:-1]), np.zeros(g.shape[:-1])
-    for real, null in strata:
-        expected = (null + 1e-3 * m / _N_BINS) * is_seen
-        total = g @ expected
-        likelihood += np.log(g) @ real - real.sum() * np.log(total / expected.sum())
-        careless += share[:, 0] * ((1 - edge) @ expected) / total * real.sum() / n
+    h, softness = r - radii[:, None, None, None], _SOFTNESS[:, None, None]
+    share = _IGNORING[:, None]
+    (mean, spread), found = EXCESS_PRIOR, list[tuple[Array, Array]]()  # by R, w and f
+    for excess, reach in _EXCESS:
+        g, edge, *_ = respect_factor(h, share, softness, excess, reach)
+        likelihood, careless = np.zeros((2, *g.shape[:-1]))
+        if excess:
+            likelihood -= ((np.log(excess) - mean) / spread) ** 2 / 2
+        for real, null in strata:
+            expected = (null + 1e-3 * m / _N_BINS) * is_seen
+            total = g @ expected
+            likelihood += np.log(g) @ real
+            likelihood -= real.sum() * np.log(total / expected.sum())
+            careless += share[:, 0] * ((1 - edge) @ expected) / total * real.sum() / n
+        found.append((likelihood, careless))
+    likelihood, careless = np.stack(found, axis=1)
     is_likely = 2 * (likelihood.max() - likelihood) <= chi2.ppf(_LEVEL, 1) * (1 + n / m)
-    best = likelihood.argmax()
-    radius = np.broadcast_to(
-        np.where(share[:, 0] < 0.5, radii[:, None, None], 0.0), likelihood.shape
-    )
+    is_zone = _IGNORING < 0.5
+    radius = np.broadcast_to(radii[:, None, None] * is_zone, likelihood.shape)
+    best, least = likelihood.argmax(), radius[is_likely].min()
+    at, most = radius.flat[best], radius[is_likely].max()
     return RespectRadius(
-        radius=round(float(radius.flat[best]), 2),
-        low=round(float(radius[is_likely].min()), 2),
-        high=round(float(radius[is_likely].max()), 2),
+        radius=round(float(at), 2),
+        low=round(float(min(least, max(at - _MODEL_ERROR, 0.0))), 2),
+        high=round(float(max(most, at + _MODEL_ERROR)), 2),
         careless=float(careless.flat[best]),
         careless_high=float(careless[is_likely].max()),
     )

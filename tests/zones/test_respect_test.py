@@ -93,7 +93,10 @@ def test_different_mix_of_kinds_is_no_respect() -> None:
 
 
 def test_attraction_is_no_respect(tmp_path: Path) -> None:
-    """A plaza without clearance whose zones are tiny: everybody walks right at everybody."""
+    """A plaza without clearance whose zones are tiny: everybody walks right at everybody.
+
+    The radius is at most that of these zones.
+    """
     tiny = szlib.Ellipse((0, 0), (0.15, 0.15))
     settings = szlib.PlazaSettings(
         n_encounters=250,
@@ -109,7 +112,7 @@ def test_attraction_is_no_respect(tmp_path: Path) -> None:
     null = szlib.null_encounters(tracks, shifts=39, minutes=(1, 6), progress=False)
     test = null_test(szlib.find_encounters(tracks), null)
     assert test.p_value > 0.5
-    assert test.respect.radius == 0
+    assert test.respect.radius <= 0.15
     assert not test.is_significant
 
 
