@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from studies.pooling import pool
 from studies.respect import data_and_null
 
 import szlib
@@ -46,7 +45,6 @@ def main() -> None:
     asked = parser.parse_args()
     zones = {name: fit(asked, site) for name, (site, _, _) in SOURCES.items()}
     entries = {name: describe(name, zone) for name, zone in zones.items()}
-    entries["pooled-strangers"] = describe_pooled(zones)
     entries["atc-paper"] = describe_paper(asked, None)
     entries["atc-paper-strangers"] = describe_paper(asked, "strangers")
     entries["hall"] = {
@@ -123,23 +121,6 @@ def round_ellipse(ellipse: szlib.Ellipse) -> dict[str, Any]:
         "center": [round(value, 3) for value in ellipse.center],
         "semi_axes": [round(value, 3) for value in ellipse.semi_axes],
         "angle": round(ellipse.angle, 3),
-    }
-
-
-def describe_pooled(zones: dict[str, szlib.SocialZone]) -> dict[str, Any]:
-    """The entry of the circle with the mean radius of respect of all sites."""
-    radii = {name: zone.null_test.respect for name, zone in zones.items()}
-    pooled = pool({name: (each.radius, each.low, each.high) for name, each in radii.items()})
-    radius = round(pooled.mean, 3)
-    return {
-        "ellipse": {"center": [0.0, 0.0], "semi_axes": [radius, radius], "angle": 0.0},
-        "intervals": {"radius": [round(pooled.low, 3), round(pooled.high, 3)]},
-        "n_encounters": sum(int(zone.provenance["encounters"]) for zone in zones.values()),
-        "method": f"radius of respect, mean of {pooled.n_sites} sites, random effects",
-        "verdict": "undecided",
-        "reasons": [f"{pooled.n_sites} sites do not tell what to expect at a new one: {pooled}"],
-        "source": "; ".join(source for _, source, _ in SOURCES.values()),
-        "cite": "; ".join(cite for _, _, cite in SOURCES.values()),
     }
 
 

@@ -58,9 +58,8 @@ def reference_zone(name: str) -> ReferenceZone:
     Parameters
     ----------
     name : "atc-strangers" (a day of the ATC mall, Osaka: a circle, because too few people met for more),
-        "grand-central-strangers" (Grand Central, New York), "pooled-strangers" (a circle with the mean radius
-        of both sites), "atc-paper" and "atc-paper-strangers" (that ATC day by the paper's method, all and
-        strangers), or "hall" (a circle: Hall's personal distance).
+        "grand-central-strangers" (Grand Central, New York), "atc-paper" and "atc-paper-strangers" (that ATC
+        day by the paper's method, all and strangers), or "hall" (a circle: Hall's personal distance).
 
     Raises
     ------

@@ -26,11 +26,11 @@ Its likelihood is that of the ellipse (`szlib.zones.respect`), with h = r - R:
 R is the distance at which careful people are half as frequent as in the null model, but for those who step
 aside and are seen just outside (A and c). Without them, people who swerve around a circle of 0.8 m seemed to
 keep 0.74 m. The likelihood is computed for *all* R and the rest of a fine grid, so the best one is not missed
-and needs no start; A has the prior of the ellipse. The interval holds every R with 2 (log L_max - max over the
-rest of log L) below 3.84, the 95 % quantile of chi square with one degree of freedom, times 1 + n/m for n
-encounters of the data and m of the null model. Because people differ from the model, it is at least
-`_MODEL_ERROR` wide on both sides. It is meant to contain the true radius. On 30 crowds that swerve around
-circles of 0.5, 0.8 and 1.0 m it does, and R is right to 1 cm.
+and needs no start; A has the prior of the ellipse. The interval holds every R with 2 (log L_max - log L)
+below 3.84, with L the best over the rest: the 95 % quantile of chi square with one degree of freedom, times
+1 + n/m for n encounters of the data and m of the null model. Because people differ from the model, it is at
+least `_MODEL_ERROR` wide on both sides. It is meant to contain the true radius. In 30 crowds that swerve
+around circles of 0.5, 0.8 and 1.0 m it does, and R is right to 1 cm.
 """
 
 from __future__ import annotations

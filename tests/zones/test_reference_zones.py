@@ -33,17 +33,6 @@ def test_each_zone_can_be_kept_by_a_robot_and_says_what_it_rests_on(name: str) -
     assert step.safe
 
 
-def test_the_pooled_zone_lies_between_the_sites() -> None:
-    names = ("atc-strangers", "grand-central-strangers")
-    sites, shipped = (
-        [szlib.reference_zone(name) for name in names],
-        szlib.reference_zone("pooled-strangers"),
-    )
-    radii = sorted(zone.ellipse.semi_axes[1] for zone in sites)
-    assert radii[0] < shipped.ellipse.semi_axes[0] < radii[1]
-    assert shipped.n_encounters == sum(zone.n_encounters for zone in sites)
-
-
 def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
     with pytest.raises(
         szlib.ZoneError, match=r"name must be one of atc-strangers, .*; got 'atc'"
