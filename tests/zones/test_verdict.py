@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from benchmarks.truth import crowds
 from studies.imposed_zone import PairedSamples
 from studies.noninteracting_crowd import noninteracting_crowd
 
@@ -261,6 +262,20 @@ def test_core_is_found_and_held(core: float) -> None:
     assert np.mean([each.radius for each in radii]) == pytest.approx(core, abs=0.03)
     held = np.mean([each.low <= core <= each.high for each in radii])
     assert held >= 0.83  # 90 % or more are expected; fewer than 25 of 30: 1 %
+
+
+@pytest.mark.parametrize("core", [0.5, 1.0])
+def test_people_who_step_aside_do_not_shrink_the_radius(core: float) -> None:
+    """They are seen just outside of the circle around which they swerve."""
+    rng = np.random.default_rng(0)
+    walks = crowds.singles(rng, 800, 1200.0)
+    crowds.swerving(walks, rng, (core, core))
+    tracks = crowds.read(crowds.as_table(walks), rng)
+    against = szlib.null_pairs(tracks, area=crowds.AREA, shifts=9, progress=False)
+    samples = szlib.find_pairs(tracks, area=crowds.AREA)
+    found = fit_radius(collect_approaches(samples, against))
+    assert found.low <= core <= found.high
+    assert found.high - found.low < 0.15
 
 
 def test_radius_does_not_shrink_as_encounters_are_added() -> None:

@@ -52,6 +52,8 @@ def judge_zones(
     """Judge crowds that swerve around an ellipse, and say which intervals hold it."""
     a, b = map(float, names)
     truth = {"a": max(a, b), "b": min(a, b), "area": np.pi * a * b, "center_x": 0.0}
+    if a == b:
+        truth["radius"] = a
     for seed in range(asked.first, asked.first + asked.crowds):
         rng = np.random.default_rng([seed, 0])
         walks = singles(rng, asked.people, SECONDS)
@@ -80,6 +82,7 @@ def judge(tracks: pd.DataFrame, *, lone: bool) -> dict[str, Any]:
         test.sensor is not None and test.sensor.loses_people and test.p_beyond > 0.05
     )
     row: dict[str, Any] = {"n": test.n_encounters, "p": test.p_value}
+    row |= {"radius_low": test.respect.low, "radius_high": test.respect.high}
     # Intervals take longest; without respect they cannot make a zone usable.
     options = {"n_resamples": 0} if sensor or not test.is_significant else {}
     try:
