@@ -255,8 +255,8 @@ record.check(
 # - $r$ is the nearest approach of an encounter [m], $g$ the ratio.
 # - $R$ is the radius of the respect zone [m], $w$ the softness of its edge [m].
 # - $f$ is the share of careless people, who enter the zones of others.
-# - $A$ and $c$ are for people who step aside: they are seen just outside, more often than by chance. Without them, people
-#   who swerve around a circle of 0.80 m seem to keep 0.74 m (30 crowds with a known circle).
+# - $A$ and $c$ are for people who step aside: they are seen just outside, more often than by chance. Without these two
+#   numbers, people who swerve around a known circle seem to keep a smaller one.
 #
 # Beyond 1.2 m the figure takes reactions to be small: it scales the counts by chance to agree with the data there.
 # Ratios above 3 are not drawn.
