@@ -211,9 +211,10 @@ def respect_factor(
     return f + (1 - f) * s * (1 + near), s, near, outside
 
 
-def _edge(p: Array) -> Array:
+def _edge(p: Array) -> tuple[Any, Any, Any, Any]:
     """The last arguments of `respect_factor` from the parameters `p`."""
-    return np.concatenate([expit(p[8:9]), np.exp(p[9:])])
+    w, excess, reach = np.exp(p[9:])
+    return expit(p[8]), w, excess, reach
 
 
 def _factor_and_slopes(h: Array, p: Array) -> tuple[Array, Array, Array]:
