@@ -414,7 +414,8 @@ record.figure(fig, "n-curve")
 # <details><summary>Answer</summary>
 #
 # The hull: it shrinks as people are added, because the nearest of more people is nearer. The radius of the respect zone
-# stays, and its interval becomes narrower. In the null model this radius goes to 0, as it should.
+# stays, and its band becomes narrower. In the null model the mean radius goes to 0, as it should. The last point of
+# each panel is a single draw of all encounters, and one crowd by chance may show any radius: so p decides, not R.
 #
 # </details>
 
