@@ -17,7 +17,6 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
@@ -33,6 +32,7 @@ import szlib
 from szlib.core.parallel import run_tasks
 from szlib.tracks.clock import to_clock
 from szlib.workbook import figures
+from szlib.zones.respect_test import collect_approaches, fit_radius
 
 Encounters = tuple[pd.DataFrame, szlib.NullEncounters]
 """Samples of a site and its null model."""
@@ -236,7 +236,7 @@ def describe_site(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, f
         **describe_radius(test, "radius"),
         "careless": test.respect.careless,
         "careless_high": test.respect.careless_high,
-        "null_radius_high": np.nanpercentile(null_radii(null), 97.5),
+        "null_radius_high": np.nanpercentile(null_radii(data, null), 97.5),
         "p_value": test.p_value,
         "p_value_beyond_0.5m": bodies.p_value,
         "hull_a": hull_a(data),
@@ -274,23 +274,24 @@ def fit_quietly(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
         return szlib.SocialZone.fit(samples, **options)
 
 
-def null_radii(null: szlib.NullEncounters) -> list[float]:
+def null_radii(data: pd.DataFrame, null: szlib.NullEncounters) -> list[float]:
     """Radius of the respect zone of each shift against all others [m]; NaN if there is nothing to compare."""
-    return [radius(null.one(shift), other_shifts(null, shift)) for shift in range(null.shifts)]
+    found = collect_approaches(data, null, smooth=True)
+    return [radius(found, null.r_max, shift) for shift in range(1, 1 + null.shifts)]
 
 
-def other_shifts(null: szlib.NullEncounters, shift: int) -> szlib.NullEncounters:
-    """The null model without one shift; only its encounters, which are all that `null_test` looks at."""
-    others = null.encounters[null.encounters["shift"] != shift]
-    renumbered = others.assign(shift=others["shift"] - (others["shift"] > shift))
-    return replace(null, samples=null.samples.iloc[:0], encounters=renumbered, shifts=null.shifts - 1)
+def radius(found: pd.DataFrame, r_max: float, shift: int, encounters: np.ndarray | None = None) -> float:
+    """Radius of some `encounters` of a `shift`, 0 for the data, against all other shifts [m].
 
-
-def radius(data: pd.DataFrame, null: szlib.NullEncounters) -> float:
-    """Radius of the respect zone [m]; NaN if there is nothing to compare."""
+    `found` are the approaches of all (`collect_approaches`). NaN if there is nothing to compare.
+    """
+    drawn = found[found["shift"] == shift]
+    if encounters is not None:
+        drawn = drawn[drawn["encounter"].isin(encounters)]
+    others = found[(found["shift"] > 0) & (found["shift"] != shift)]
     try:
-        return szlib.null_test(data, null).respect.radius
-    except (szlib.ZoneError, szlib.DataError):
+        return fit_radius(pd.concat([drawn.assign(shift=0), others]), r_max).radius
+    except szlib.ZoneError:
         return np.nan
 
 
@@ -351,16 +352,16 @@ def draws(data: pd.DataFrame, null: szlib.NullEncounters, n: int, times: int) ->
     """Hull and respect radius of n encounters of the data, and of n of one shift of the null model."""
     rng = np.random.default_rng(n)
     numbers = data["encounter"].unique()
+    found = collect_approaches(data, null, smooth=True)
     for k in range(times):
-        part = data[data["encounter"].isin(rng.choice(numbers, n, replace=False))]
+        drawn = rng.choice(numbers, n, replace=False)
         shift = k % null.shifts
         own = null.encounters.loc[null.encounters["shift"] == shift, "encounter"].to_numpy()
-        model = null.one(shift)
-        chosen = model[model["encounter"].isin(rng.choice(own, min(n, len(own)), replace=False))]
+        others = rng.choice(own, min(n, len(own)), replace=False)
         yield {
-            "hull_a": hull_a(part),
-            "respect": radius(part, null),
-            "null_respect": radius(chosen, other_shifts(null, shift)),
+            "hull_a": hull_a(data[data["encounter"].isin(drawn)]),
+            "respect": radius(found, null.r_max, 0, drawn),
+            "null_respect": radius(found, null.r_max, 1 + shift, others),
         }
 
 

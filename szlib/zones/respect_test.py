@@ -30,8 +30,10 @@ and needs no start; A has the prior of the ellipse. The interval holds every R w
 below 3.84, with L the best over the rest: the 95 % quantile of chi square with one degree of freedom, times
 1 + n/m for n encounters of the data and m of the null model. Because people differ from the model, it is at
 least `_MODEL_ERROR` wide on both sides. It is meant to contain the true radius. In 30 crowds that swerve
-around circles of 0.5, 0.8 and 1.0 m it does, and R is right to 1 cm. Noise is not in the model: the nearest
-approach is the least of noisy distances, so 5 cm of noise at 10 Hz make R 9 cm too small.
+around circles of 0.5, 0.8 and 1.0 m it does, and R is right to 1 cm. Noise is not in the model, and the
+nearest of several noisy distances is too near. So the radius comes from smoothed paths
+(`szlib.zones.quantile`). What is left of 5 cm of noise at 10 Hz makes R 2 to 3 cm too small, of 10 cm 5 to
+8 cm (9 and 15 cm without smoothing).
 """
 
 from __future__ import annotations
@@ -53,6 +55,7 @@ from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
 from ..encounters.pairs import SensorCheck
 from .outliers import R_MAX, nearest_approaches
+from .quantile import smooth_paths
 from .respect_likelihood import EXCESS_PRIOR, respect_factor
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
@@ -72,14 +75,20 @@ _LEVEL = 0.95
 
 
 def collect_approaches(
-    samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0
+    samples: pd.DataFrame,
+    null: NullEncounters,
+    *,
+    excluded_below: float = 0.0,
+    smooth: bool = False,
 ) -> pd.DataFrame:
     """Collect the encounters of `samples` and `null` that came within `excluded_below` [m] to its r_max.
 
+    With `smooth`, they are those on smoothed paths; of the null model, those whose samples are stored.
+
     Returns
     -------
-    One row for each encounter: nearest [m]; shift, 0 for the data and from 1 on for the shifts; kind, a
-    number. Without a column `kind` in `samples` and `null`, all encounters are of one kind.
+    One row for each encounter: encounter; nearest [m]; shift, 0 for the data and from 1 on for the shifts;
+    kind, a number. Without a column `kind` in `samples` and `null`, all encounters are of one kind.
 
     Raises
     ------
@@ -87,15 +96,22 @@ def collect_approaches(
     ZoneError : no encounter of the data or of the null model came so near.
     """
     check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
+    model = null.encounters
+    if smooth:
+        samples, stored = (
+            each.assign(distance=smooth_paths(each)[1])
+            for each in (samples, null.samples)
+        )
+        model = nearest_approaches(stored).rename(columns={"distance": "nearest"})
     data = nearest_approaches(samples).rename(columns={"distance": "nearest"})
-    has_kinds = "kind" in data and "kind" in null.encounters
-    columns = ["nearest", "shift", "kind"] if has_kinds else ["nearest", "shift"]
+    has_kinds = "kind" in data and "kind" in model
+    columns = ["encounter", "nearest", "shift", *(["kind"] if has_kinds else [])]
     counted = [
         each.loc[
             (each["nearest"] >= excluded_below) & (each["nearest"] < null.r_max),
             columns,
         ]
-        for each in (data.assign(shift=-1), null.encounters)
+        for each in (data.assign(shift=-1), model)
     ]
     if not all(map(len, counted)):
         raise ZoneError(
@@ -288,16 +304,19 @@ def null_test(
     if sensor is not None and sensor.loses_people:
         far = found[found["nearest"] >= sensor.resolved]
         p_beyond = _compare(far, null.shifts)[0] if (far["shift"] == 0).any() else 1.0
+    smoothed = collect_approaches(
+        samples, null, excluded_below=excluded_below, smooth=True
+    )
     return NullTest(
         p_value=p_value,
         statistic=float(statistics[0]),
         null_statistics=tuple(map(float, statistics[1:])),
         n_encounters=int((found["shift"] == 0).sum()),
-        respect=fit_radius(found, null.r_max),
+        respect=fit_radius(smoothed, null.r_max),
         excluded_below=float(excluded_below),
         sensor=sensor,
         p_beyond=p_beyond,
-        null_radius=_fit_null_radius(found, null),
+        null_radius=_fit_null_radius(smoothed, null),
         grouped=float(null.parameters.get("grouped", 0.0)),
     )
 

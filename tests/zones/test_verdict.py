@@ -264,18 +264,27 @@ def test_core_is_found_and_held(core: float) -> None:
     assert held >= 0.83  # 90 % or more are expected; fewer than 25 of 30: 1 %
 
 
-@pytest.mark.parametrize("core", [0.5, 1.0])
-def test_people_who_step_aside_do_not_shrink_the_radius(core: float) -> None:
-    """They are seen just outside of the circle around which they swerve."""
+def walk_around(core: float, noise: float = 0.0) -> szlib.NullTest:
+    """The test of people who swerve around circles, seen with a `noise` [m]."""
     rng = np.random.default_rng(0)
     walks = crowds.singles(rng, 800, 1200.0)
     crowds.swerving(walks, rng, (core, core))
-    tracks = crowds.read(crowds.as_table(walks), rng)
+    tracks = crowds.read(crowds.as_table(walks), rng, noise=noise)
     against = szlib.null_pairs(tracks, area=crowds.AREA, shifts=9, progress=False)
-    samples = szlib.find_pairs(tracks, area=crowds.AREA)
-    found = fit_radius(collect_approaches(samples, against))
+    return szlib.null_test(szlib.find_pairs(tracks, area=crowds.AREA), against)
+
+
+@pytest.mark.parametrize("core", [0.5, 1.0])
+def test_people_who_step_aside_do_not_shrink_the_radius(core: float) -> None:
+    """They are seen just outside of the circle around which they swerve."""
+    found = walk_around(core).respect
     assert found.low <= core <= found.high
     assert found.high - found.low < 0.15
+
+
+def test_noise_hardly_shrinks_the_radius() -> None:
+    """The nearest of many distances with an error of 7 cm is 9 cm too near."""
+    assert walk_around(0.8, noise=0.05).respect.radius == pytest.approx(0.8, abs=0.05)
 
 
 def test_radius_does_not_shrink_as_encounters_are_added() -> None:
