@@ -214,14 +214,14 @@ class RespectEstimator(Estimator):
         return self.posterior(speeds)[rng.integers(len(self.draws.values), size=n)]
 
     def has_converged(self) -> bool:
-        """Whether the ensembles agree and are long enough."""
+        """Whether the groups of draws agree and are large enough."""
         return self.draws.has_converged
 
     def describe_posterior(self) -> str:
-        """Number of draws, and how well the ensembles agree."""
+        """Number of draws, and how well they agree."""
         found = self.draws
         return (
-            f"{len(found.values)} draws, {found.n_effective:.0f} of them effective, "
+            f"{found.n_evaluated} draws, {found.n_effective:.0f} of them effective, "
             f"R-hat {found.r_hat:.3f}"
         )
 

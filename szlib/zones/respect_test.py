@@ -343,16 +343,15 @@ def _find_deficits(found: pd.DataFrame, shifts: int) -> NDArray[np.float64]:
 
     The expectation for each kind is the share of all shifts together, drawn without replacement.
     """
-    near = found["nearest"].to_numpy()[:, None] < RADII
     shift, kind = found["shift"].to_numpy(), found["kind"].to_numpy()
+    # the first radius within which each encounter came, and its shift, in one number
+    width = len(RADII) + 1
+    cell = shift * width + np.searchsorted(RADII, found["nearest"], side="right")
     deficit = variance = np.zeros((shifts, len(RADII)))
     for each in range(kind.max() + 1):
-        is_kind = kind == each
-        n = np.bincount(shift[is_kind], minlength=shifts)[:, None]
-        k = np.stack(
-            [np.bincount(shift[is_kind], c, minlength=shifts) for c in near[is_kind].T],
-            axis=1,
-        )
+        count = np.bincount(cell[kind == each], minlength=shifts * width)
+        within = count.reshape(shifts, width).cumsum(axis=1)
+        k, n = within[:, :-1], within[:, -1:]
         total = n.sum()
         share = k.sum(axis=0) / total
         deficit = deficit + n * share - k

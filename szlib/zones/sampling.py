@@ -1,10 +1,14 @@
-"""Draws from a posterior density by several ensembles of walkers, until the ensembles agree.
+"""Draws from a posterior density by importance sampling that adapts.
 
-Each walker of an ensemble steps along the difference of two others, so that steps fit the density without a
-gradient or a covariance (differential evolution; Ter Braak, Statistics and Computing 16, 2006). emcee moves
-the walkers (Foreman-Mackey et al., PASP 125, 2013). The ensembles do not know each other. They end when the
-largest R-hat is below 1.01 and each parameter that is reported has 400 effective draws (Vehtari et al.,
-Bayesian Analysis 16, 2021), or after `_MOST_BLOCKS` blocks.
+In each round, draws from a multivariate t distribution are weighted by the density. The next t distribution
+has the weighted mean and covariance of all draws so far. The weight of a draw is the density over the mean of
+all t distributions (adaptive multiple importance sampling; Cornuet et al., Scandinavian Journal of Statistics
+39, 2012). Early on few draws have all the weight: then all weights are raised to a power below 1. No gradient
+is needed, and small peaks of the density do not hold a draw back.
+
+The draws of each round are dealt to four groups. The rounds end when the groups agree, with the largest R-hat
+below 1.01, and `_ENOUGH` draws are effective (400 would do: Vehtari et al., Bayesian Analysis 16, 2021), or
+after `_MOST_ROUNDS` rounds.
 """
 
 from __future__ import annotations
@@ -12,34 +16,40 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import emcee
 import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import multivariate_t
 
 from ..core.checks import Array
 
 R_HAT, EFFECTIVE = 1.01, 400
-_ENSEMBLES, _WALKERS = 4, 5  # walkers for each parameter
-_BURN_IN, _BLOCK, _MOST_BLOCKS = 60, 40, 12  # steps; blocks
-_MOVES = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
+_ENOUGH = 500  # effective draws, more than needed: to stop by luck costs little
+_GROUPS, _DRAWN, _MOST_ROUNDS = 4, 300, 60  # draws of a round
+_FREEDOM = 5.0  # degrees of freedom of the t distributions: long tails
+_FEWEST = 5  # effective draws for each parameter to which a t distribution is fitted
+_KEPT = 4000  # equally likely draws in the end
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Draws of all walkers.
+    """Equally likely draws.
 
     Parameters
     ----------
     values : the draws, shape (k, d).
-    r_hat, n_effective : the largest R-hat, and the fewest effective draws, of a reported parameter.
+    r_hat : the largest R-hat of a reported parameter, between the groups.
+    n_effective : number of independent draws that are worth as much as all weighted ones.
+    n_evaluated : number of times that the density was evaluated.
     """
 
     values: Array
     r_hat: float
     n_effective: float
+    n_evaluated: int
 
     @property
     def has_converged(self) -> bool:
-        """Whether the ensembles agree and are long enough."""
+        """Whether the groups agree and are large enough."""
         return self.r_hat < R_HAT and self.n_effective >= EFFECTIVE
 
 
@@ -61,8 +71,18 @@ def sample(
     start : the maximum of the density, or near it, shape (d,).
     low, high : bounds of the parameters, shape (d,).
     rng : of the draws.
-    spread : standard deviation of the first walkers around the start, as a share of the bounds, shape (d,).
-    n_reported : the ensembles must agree about so many parameters, the first ones.
+    spread : scale of the first draws around the start, as a share of the bounds, shape (d,).
+    n_reported : the groups must agree about so many parameters, the first ones.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.zones.sampling import sample
+    >>> bell = lambda p: -12.5 * float(p @ p)
+    >>> edge, rng = np.ones(3), np.random.default_rng(0)
+    >>> draws = sample(bell, 0 * edge, -edge, edge, rng, spread=0.3 * edge, n_reported=3)
+    >>> draws.has_converged, [round(float(each), 1) for each in draws.values.std(axis=0)]
+    (True, [0.2, 0.2, 0.2])
     """
 
     def log_inside(p: Array) -> float:
@@ -70,61 +90,72 @@ def sample(
         is_inside = bool(((low < p) & (p < high)).all())
         return log_density(p) if is_inside else -np.inf
 
-    d = len(start)
-    ensembles = [
-        emcee.EnsembleSampler(_WALKERS * d, d, log_inside, moves=_MOVES)
-        for _ in range(_ENSEMBLES)
-    ]
-    for ensemble in ensembles:
-        shift = spread * rng.normal(size=(_WALKERS * d, d))
-        edge = spread * rng.uniform(size=shift.shape)
-        share = np.clip((start - low) / (high - low) + shift, edge, 1 - edge)
-        seed = np.random.RandomState(rng.integers(2**31)).get_state()
-        first = emcee.State(low + (high - low) * share, random_state=seed)
-        ensemble.run_mcmc(first, _BURN_IN)
-        ensemble.reset()
-    for _ in range(_MOST_BLOCKS):
-        for ensemble in ensembles:
-            ensemble.run_mcmc(None, _BLOCK)
-        # by ensemble, step, walker and parameter
-        draws = np.stack([ensemble.get_chain() for ensemble in ensembles])
-        found = Draws(draws.reshape(-1, d), *diagnose(draws[..., :n_reported]))
-        if found.has_converged:
+    variance = (spread * (high - low)) ** 2
+    values, log_f = np.empty((0, len(start))), np.empty(0)
+    proposals = [(start, np.diag(variance))]
+    while True:
+        drawn = multivariate_t.rvs(
+            *proposals[-1], _FREEDOM, size=_DRAWN, random_state=rng
+        )
+        drawn = drawn.reshape(_DRAWN, -1)
+        values = np.concatenate([values, drawn])
+        log_f = np.append(log_f, [log_inside(p) for p in drawn])
+        by_proposal = [multivariate_t.logpdf(values, *p, _FREEDOM) for p in proposals]
+        log_weight = log_f - logsumexp(by_proposal, axis=0) + np.log(len(proposals))
+        r_hat, n_effective = diagnose(values[:, :n_reported], log_weight)
+        is_enough = r_hat < R_HAT and n_effective >= _ENOUGH
+        if is_enough or len(proposals) == _MOST_ROUNDS:
             break
-    return found
+        weight = _temper(log_weight, _FEWEST * len(start))
+        covariance = np.cov(values.T, aweights=weight) + 1e-6 * np.diag(variance)
+        proposals.append((weight @ values, covariance))
+    share = (np.arange(_KEPT) + rng.uniform()) / _KEPT
+    at = np.searchsorted(_weigh(log_weight).cumsum(), share)
+    kept = values[np.minimum(at, len(values) - 1)]
+    return Draws(kept, r_hat, n_effective, len(values))
 
 
-def diagnose(draws: Array) -> tuple[float, float]:
-    """The largest split R-hat, and the fewest effective draws, over the parameters.
+def _weigh(log_weight: Array) -> Array:
+    """Weights that add up to 1, none above the square root of their number times the mean.
+
+    That limit costs little bias, and no draw has all the weight (Ionides, Journal of Computational and
+    Graphical Statistics 17, 2008).
+    """
+    weight = np.exp(log_weight - log_weight.max())
+    weight = np.minimum(weight, weight.mean() * np.sqrt(len(weight)))
+    return np.asarray(weight / weight.sum())
+
+
+def _temper(log_weight: Array, fewest: float) -> Array:
+    """Weights raised to the largest power, at most 1, that leaves the `fewest` effective draws."""
+    for power in 0.85 ** np.arange(60):
+        weight = _weigh(np.where(np.isfinite(log_weight), power * log_weight, -np.inf))
+        if 1 / (weight @ weight) >= fewest:
+            break
+    return weight
+
+
+def diagnose(values: Array, log_weight: Array) -> tuple[float, float]:
+    """The largest R-hat of the parameters, and the number of effective draws.
 
     Parameters
     ----------
-    draws : by ensemble, step, walker and parameter, shape (m, n, w, d). R-hat compares the ensembles, each
-        split in two halves. Autocorrelation is that of the walkers.
+    values : draws of all groups in turn, shape (k, d).
+    log_weight : logarithms of their weights, shape (k,).
 
     Examples
     --------
     >>> import numpy as np
     >>> from szlib.zones.sampling import diagnose
-    >>> r_hat, n = diagnose(np.random.default_rng(0).normal(size=(4, 500, 10, 2)))
-    >>> r_hat < 1.01, n > 10_000
-    (True, True)
+    >>> r_hat, n = diagnose(np.random.default_rng(0).normal(size=(2000, 2)), np.zeros(2000))
+    >>> r_hat < 1.01, round(n)
+    (True, 2000)
     """
-    m, n, w, d = draws.shape
-    halves = draws[:, : n // 2 * 2].reshape(2 * m, -1, d)
-    within = halves.var(axis=1, ddof=1).mean(axis=0)
-    between = halves.mean(axis=1).var(axis=0, ddof=1)
-    r_hat = np.sqrt(1 + between / within).max()
-
-    walkers = draws.transpose(0, 2, 1, 3).reshape(m * w, n, d)
-    spread = walkers.var(axis=1, ddof=1).mean(axis=0)
-    total = (n - 1) / n * spread + walkers.mean(axis=1).var(axis=0, ddof=1)
-    centred = walkers - walkers.mean(axis=1, keepdims=True)
-    spectrum = np.abs(np.fft.rfft(centred, 2 * n, axis=1)) ** 2
-    covariance = np.fft.irfft(spectrum, axis=1)[:, :n].mean(axis=0) / n
-    correlation = 1 - (spread - covariance * n / (n - 1)) / total
-    pairs = correlation[0 : n // 2 * 2 : 2] + correlation[1 : n // 2 * 2 : 2]
-    # Geyer's initial positive sequence
-    pairs = np.where(np.cumprod(pairs > 0, axis=0), pairs, 0)
-    time = np.maximum(2 * pairs.sum(axis=0) - 1, 1 / np.log10(m * w * n))
-    return float(r_hat), float((m * w * n / time).min())
+    means, variances = [], []
+    for group in range(_GROUPS):
+        weight, of_group = _weigh(log_weight[group::_GROUPS]), values[group::_GROUPS]
+        means.append(weight @ of_group)
+        variances.append(weight @ (of_group - means[-1]) ** 2)
+    ratio = np.var(means, axis=0, ddof=1) / np.mean(variances, axis=0)
+    weight = _weigh(log_weight)
+    return float(np.sqrt(1 + ratio.max())), float(1 / (weight @ weight))
