@@ -39,9 +39,9 @@ _PARAMETERS = [
     (-0.6, 0.6, 0.0, 0.15),  # its change with speed
     (-0.6, 0.6, 0.0, 0.15),  # shear
     (-6.0, 1.5, 0.0, np.inf),  # logit f
-    (*np.log([0.015, 0.3, 1.0]), np.inf),  # log w [m]
+    (*np.log([0.005, 0.3, 1.0]), np.inf),  # log w [m]
     (-5.0, 8.0, *EXCESS_PRIOR),  # log A
-    (*np.log([0.08, 0.6, 1.0]), np.inf),  # log c [m]
+    (*np.log([0.01, 0.6, 1.0]), np.inf),  # log c [m]
 ]
 _LOW, _HIGH, _MEAN, _SPREAD = np.transpose(_PARAMETERS)
 _REPORTED = 9  # the ellipse, and the share f of careless people

@@ -67,7 +67,7 @@ _MIN_EXPECTED = 30
 # Softness of the edge w [m]; f, with a half and more there is no zone; A and c [m].
 _SOFTNESS = np.array([0.005, 0.02, 0.06, 0.12, 0.25])
 _IGNORING = np.array([0.0, *expit(np.linspace(-6, 4, 15))])
-_EXCESS = [(0.0, 1.0), *product((0.3, 1.0, 4.0), (0.08, 0.2, 0.5))]
+_EXCESS = [(0.0, 1.0), *product((0.3, 1.0, 4.0, 16.0), (0.02, 0.08, 0.2, 0.5))]
 _MODEL_ERROR = 0.02  # [m]
 _FARTHEST = 0.8  # largest R, in r_max: beyond it people at a distance are hardly seen
 _N_RADII, _N_BINS = 160, 80  # values of R up to there, and bins of r up to r_max

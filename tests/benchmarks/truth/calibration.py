@@ -52,7 +52,7 @@ def draw_encounters(
     null: PairPaths, p: np.ndarray, rng: np.random.Generator
 ) -> PairPaths:
     """Draw encounters of `null` with the frequencies of the model with parameters `p`."""
-    g = model._factor(null.distances(p)[0], p)[0]
+    g = model.respect_factor(null.distances(p)[0], *model._edge(p))[0]
     share = np.zeros(len(g))
     for kind in np.unique(null.kind):
         of_kind = null.kind == kind

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
+import pyrvo
 
 from szlib.encounters.geometry import Square
 from szlib.tracks.clock import to_clock
@@ -308,6 +309,38 @@ def swerving(
                 path = walks[k].path
                 bump = np.exp(-(((np.arange(len(path)) - middle) / 12.0) ** 2))
                 path += sign * min(missing, 1.0) * bump[:, None] * away / size
+
+
+def orca(walks: list[Walk], radius: float) -> None:
+    """Let everybody walk on to the end of the path by ORCA, as discs whose centres stay a `radius` [m] apart."""
+    near = (5.0, 10, 2.0, 2.0)  # distance [m], number of neighbours, horizons [s]
+    walking: list[tuple[Walk, list[np.ndarray], np.ndarray, float]] = []
+    coming = sorted(walks, key=lambda walk: walk.tick)
+    for tick in range(coming[0].tick, 10**6):
+        while coming and coming[0].tick == tick:
+            walk = coming.pop(0)
+            speed = float(np.hypot(*(walk.path[1] - walk.path[0]))) / _DT
+            walking.append((walk, [walk.path[0]], np.zeros(2), speed))
+        if not (coming or walking):
+            return
+        simulator = pyrvo.RVOSimulator(_DT, *near, radius / 2, 2.0)
+        for i, (walk, path, velocity, speed) in enumerate(walking):
+            ahead = walk.path[-1] - path[-1]
+            wanted = speed * ahead / max(float(np.hypot(*ahead)), 1e-6)
+            simulator.add_agent(
+                path[-1].tolist(), *near, radius / 2, 1.3 * speed, velocity.tolist()
+            )
+            simulator.set_agent_pref_velocity(i, wanted.tolist())
+        simulator.do_step()
+        going = []
+        for i, (walk, path, velocity, speed) in enumerate(walking):
+            path.append(np.array(simulator.get_agent_position(i).to_tuple()))
+            velocity[:] = simulator.get_agent_velocity(i).to_tuple()
+            if np.hypot(*(walk.path[-1] - path[-1])) < 0.3 or len(path) > 600:
+                walk.path = np.array(path)
+            else:
+                going.append((walk, path, velocity, speed))
+        walking = going
 
 
 def _level(
