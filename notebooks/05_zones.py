@@ -94,10 +94,10 @@ for ax, shown in ((left, kept.curve().T), (right, (degrees, distance_by_directio
 if truth:
     left.plot(*truth[zone_speed].curve().T, ":", color=figures.RED, linewidth=2)
     right.plot(
-        degrees, distance_by_direction(truth[zone_speed]), ":", color=figures.RED, linewidth=2, label="truth"
+        degrees, distance_by_direction(truth[zone_speed]), ":", color=figures.RED, linewidth=2, label="zone that people keep"
     )
 right.fill_between(
-    degrees, bands["low"], bands["high"], color=figures.ORANGE, alpha=0.5, label="95 % interval"
+    degrees, bands["low"], bands["high"], color=figures.ORANGE, alpha=0.5, label="its 95 % interval"
 )
 left.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
 figures.label_metres(left, f"The zone at {zone_speed:g} m/s: {verdict}", person=True)
@@ -107,7 +107,8 @@ right.set(
     xticks=range(-180, 181, 90),
 )
 widths = 100 * (bands["high"] - bands["low"])
-right.set_title(f"The same, unrolled: the interval is {widths.min():.0f} to {widths.max():.0f} cm wide")
+what = "where 5 % come nearer" if zone.method == "quantile" else "the same, unrolled"
+right.set_title(f"{what.capitalize()}: the interval is {widths.min():.0f} to {widths.max():.0f} cm wide")
 right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 record.figure(fig, "zone")
 
@@ -140,6 +141,9 @@ real_day.compare_with_plaza(
 )
 
 # %% [markdown]
+# The band is an interval of **where 5 % come nearer**, not of the zone that people keep (dotted). The two differ by some
+# centimetres, and "Does it find the true zone?" says why. Chapter 06 has an interval that is meant to hold the truth.
+#
 # ## A number first
 #
 # Forty people passed on your left. These were the nearest approaches, sorted: **0.31**, 0.74, 0.75, 0.77, 0.80, ... m.

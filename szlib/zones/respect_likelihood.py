@@ -40,7 +40,7 @@ _PARAMETERS = [
     (-0.6, 0.6, 0.0, 0.15),  # shear
     (-6.0, 1.5, 0.0, np.inf),  # logit f
     (*np.log([0.005, 0.3, 1.0]), np.inf),  # log w [m]
-    (-5.0, 8.0, *EXCESS_PRIOR),  # log A
+    (-5.0, 3.0, *EXCESS_PRIOR),  # log A: at most 20 times as many as by chance
     (*np.log([0.01, 0.6, 1.0]), np.inf),  # log c [m]
 ]
 _LOW, _HIGH, _MEAN, _SPREAD = np.transpose(_PARAMETERS)
@@ -349,7 +349,7 @@ class Likelihood:
         near = [each.distances(circle)[0] + 1 for each in (self.data, self.null)]
         found = []
         for radius, f, w, excess in product(
-            _RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 5)
+            _RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 3)
         ):
             p = circle.copy()
             p[3], p[5], p[8:11] = (

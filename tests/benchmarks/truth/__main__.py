@@ -3,7 +3,8 @@
     python tests/benchmarks/truth short                          a few crowds without respect
     python tests/benchmarks/truth none singles groups merging    crowds without respect, 20 of each
     python tests/benchmarks/truth none groups --lone             by the paper's lone encounters
-    python tests/benchmarks/truth zone .8 .5                     crowds that keep such an ellipse
+    python tests/benchmarks/truth zone .8 .5                     crowds that swerve around such an ellipse
+    python tests/benchmarks/truth zone .8 .8 --orca              crowds that keep a circle by ORCA
 
 `none` takes names of crowds and trackers. Each crowd is printed as it comes, then the counts. `--out FILE`
 adds the crowds to a table.
@@ -21,7 +22,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from crowds import AREA, CROWDS, TRACKERS, as_table, read, singles, swerving
+from crowds import AREA, CROWDS, TRACKERS, as_table, orca, read, singles, swerving
 
 import szlib
 
@@ -49,7 +50,7 @@ def judge_crowds(
 def judge_zones(
     names: list[str], asked: argparse.Namespace
 ) -> Iterator[dict[str, Any]]:
-    """Judge crowds that swerve around an ellipse, and say which intervals hold it."""
+    """Judge crowds that keep an ellipse, and say which intervals hold it."""
     a, b = map(float, names)
     truth = {"a": max(a, b), "b": min(a, b), "area": np.pi * a * b, "center_x": 0.0}
     if a == b:
@@ -57,11 +58,13 @@ def judge_zones(
     for seed in range(asked.first, asked.first + asked.crowds):
         rng = np.random.default_rng([seed, 0])
         walks = singles(rng, asked.people, SECONDS)
-        swerving(walks, rng, (a, b))
+        if asked.orca:
+            orca(walks, a)
+        else:
+            swerving(walks, rng, (a, b))
         tracks = read(as_table(walks), rng, rate=asked.rate, noise=asked.noise)
-        row = {"crowd": f"zone {a:g} x {b:g}", "seed": seed} | judge(
-            tracks, lone=asked.lone
-        )
+        name = f"{'ORCA' if asked.orca else 'zone'} {a:g} x {b:g}"
+        row = {"crowd": name, "seed": seed} | judge(tracks, lone=asked.lone)
         for name, value in truth.items():
             low, high = (row.get(f"{name}_{end}", np.nan) for end in ("low", "high"))
             row[f"holds_{name}"] = low <= value <= high
@@ -118,6 +121,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=10.0)
     parser.add_argument("--noise", type=float, default=0.0)
     parser.add_argument("--lone", action="store_true", help="lone encounters")
+    parser.add_argument("--orca", action="store_true", help="zones kept by ORCA")
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
     if asked.what == "short":

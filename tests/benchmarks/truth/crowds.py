@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-import pyrvo
 
 from szlib.encounters.geometry import Square
 from szlib.tracks.clock import to_clock
@@ -312,7 +311,9 @@ def swerving(
 
 
 def orca(walks: list[Walk], radius: float) -> None:
-    """Let everybody walk on to the end of the path by ORCA, as discs whose centres stay a `radius` [m] apart."""
+    """Let everybody walk to the end of the path by ORCA, as discs whose centres stay a `radius` [m] apart."""
+    import pyrvo  # an extra
+
     near = (5.0, 10, 2.0, 2.0)  # distance [m], number of neighbours, horizons [s]
     walking: list[tuple[Walk, list[np.ndarray], np.ndarray, float]] = []
     coming = sorted(walks, key=lambda walk: walk.tick)
