@@ -9,10 +9,11 @@ people who ignore each other, encounters of the kind k have values of h with the
     g(h) = f + (1 - f) (1 + A exp(-max(h, 0) / c)) / (1 + exp(-h / w))
 
 f is the share of careless people among those who would enter, and w the softness of the edge. A and c
-describe people who step aside: they are then seen just outside. The mix of kinds does not matter, because p
-is conditional on the kind. Only people who come towards each other or cross are compared: on plazas with a
-known zone, those who walk in the same direction alone moved the centre by 15 cm, because a shift in time also
-separates people who keep together.
+describe people who step aside: they are then seen just outside. A is at most 20: with more, only those just
+outside would count, and an ellipse far from the true one may fit them. The mix of kinds does not matter,
+because p is conditional on the kind. Only people who come towards each other or cross are compared: on plazas
+with a known zone, those who walk in the same direction alone moved the centre by 15 cm, because a shift in
+time also separates people who keep together.
 
 The ellipse has a centre, a semi-axis along the motion and one across, and a shear. Centre and the logarithms
 of the semi-axes are linear in the speed of the person who carries it. Weak priors hold the semi-axes (0.8 m,

@@ -31,10 +31,9 @@ below 3.84, with L the best over the rest: the 95 % quantile of chi square with 
 1 + n/m for n encounters of the data and m of the null model. Because people differ from the model, it is at
 least `_MODEL_ERROR` wide on both sides. It is meant to contain the true radius. In 30 crowds that swerve
 around circles of 0.5, 0.8 and 1.0 m it does, and R is right to 1 cm; in 8 that keep circles by ORCA, whose
-edge is sharp, it does, and R is up to 2 cm too small. Noise is not in the model, and the
-nearest of several noisy distances is too near. So the radius comes from smoothed paths
-(`szlib.zones.quantile`). What is left of 5 cm of noise at 10 Hz makes R 2 to 3 cm too small, of 10 cm 5 to
-8 cm (9 and 15 cm without smoothing).
+edge is sharp, it does, and R is up to 2 cm too small. Noise is not in the model, and the nearest of several
+noisy distances is too near. So the radius comes from smoothed paths (`szlib.zones.quantile`). What is left of
+5 cm of noise at 10 Hz makes R 2 to 3 cm too small, of 10 cm 5 to 8 cm (9 and 15 cm without smoothing).
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -61,6 +62,17 @@ def random_parameters(seed: int) -> np.ndarray:
 
 
 # --- truth -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_every_pair_on_the_plaza_gives_its_zone(seed: int, tmp_path: Path) -> None:
+    """Nearly all of its people pass just outside of a zone, where chance has hardly anybody."""
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=seed))
+    against = szlib.null_pairs(tracks, shifts=19, progress=False)
+    m, n, a, b, _ = fitted(szlib.find_pairs(tracks), against)
+    true = szlib.PlazaSettings().true_zone(1.1)
+    assert (m, n) == pytest.approx(true.center, abs=0.03)
+    assert (a, b) == pytest.approx(true.semi_axes, abs=0.03)
 
 
 @pytest.mark.parametrize(
