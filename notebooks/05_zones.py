@@ -94,10 +94,20 @@ for ax, shown in ((left, kept.curve().T), (right, (degrees, distance_by_directio
 if truth:
     left.plot(*truth[zone_speed].curve().T, ":", color=figures.RED, linewidth=2)
     right.plot(
-        degrees, distance_by_direction(truth[zone_speed]), ":", color=figures.RED, linewidth=2, label="zone that people keep"
+        degrees,
+        distance_by_direction(truth[zone_speed]),
+        ":",
+        color=figures.RED,
+        linewidth=2,
+        label="zone that people keep (truth)",
     )
 right.fill_between(
-    degrees, bands["low"], bands["high"], color=figures.ORANGE, alpha=0.5, label="its 95 % interval"
+    degrees,
+    bands["low"],
+    bands["high"],
+    color=figures.ORANGE,
+    alpha=0.5,
+    label="95 % interval of the robot's zone",
 )
 left.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
 figures.label_metres(left, f"The zone at {zone_speed:g} m/s: {verdict}", person=True)
