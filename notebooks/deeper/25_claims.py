@@ -436,7 +436,7 @@ Markdown(
 # ahead of you. So the longer front of your zone hides the back of mine. Then the centre and the semi-axis a are wrong by several
 # centimetres in opposite directions, and their sum, the reach ahead, is nearly right. The posterior alone was too narrow
 # for this. So it carries an error of the model as well, measured on other plazas: a standard deviation of at least 5 cm
-# along the motion, and 1.2 cm across.
+# along the motion, and 1.8 cm for the semi-axis across.
 #
 # **A common mistake:** "the 95 % interval contains the true zone with 95 %". No: it does so only if the method aims at
 # the true zone. The quantile zone aims at a quantile, not at the true edge.

@@ -86,7 +86,8 @@ def main(names: list[str]) -> None:
             if any(folders.has_name(source, name) for name in names[1:] or REAL_DAY):
                 print(source.stem, flush=True)
                 refresh(source, "atc-1hz")
-        copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png", colours=32)
+                if source.stem == "01_tracks":
+                    copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png", colours=32)
         return
     for source in chain(*runner.split_batches(folders.list_notebooks())):
         if not names or any(folders.has_name(source, name) for name in names):
