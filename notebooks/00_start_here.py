@@ -54,13 +54,13 @@
 # ## Three routes
 #
 # - **The idea.** [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 55 min to read.
-# - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 6 h 25 min to read.
+# - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 6 h 30 min to read.
 # - **The course, in six weeks.** Reading and exercises; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | exercises | to do |
 # |---|---|---|---|---|---|
 # | 1 | Tracks, encounters, and which of them to believe | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb) | 1 h 10 min | [1.1-1.5](exercises/sheet1_tracks.ipynb#1.1-Velocity-(5-min)), [2.1-2.5](exercises/sheet2_outliers.ipynb#2.1-Complementary-coordinates-(5-min)) | 2 h 05 min |
-# | 2 | From samples to a zone; respect or emptiness | [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb) | 1 h 25 min | [3.1-3.8](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)) | 1 h 55 min |
+# | 2 | From samples to a zone; respect or emptiness | [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb) | 1 h 30 min | [3.1-3.8](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)) | 1 h 55 min |
 # | 3 | A zone of your own, and a barrier around it | [07](07_barriers.ipynb) | 50 min | [4.1-4.3](exercises/sheet4_own_zone.ipynb#4.1-A-zone-of-your-own-(an-evening,-150-min)) | 2 h 45 min |
 # | 4 | A controller of your own | [08](08_build_a_controller.ipynb) | 45 min | [5.1-5.8](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)) | 2 h 15 min |
 # | 5 | MPC with barriers, and the first meetings | [09](09_passing.ipynb), [10](10_corridor.ipynb) | 55 min | [6.1-6.5](exercises/sheet6_controller.ipynb#6.1-MPC-on-a-road-(25-min)) | 2 h 15 min |

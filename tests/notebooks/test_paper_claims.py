@@ -12,7 +12,6 @@ from studies.claims import measure_density
 from studies.sensitivity import sensitivity
 
 import szlib
-from szlib.zones import sampling
 
 
 def finding(low: float, high: float) -> claims.Finding:
@@ -198,10 +197,7 @@ def test_zones_without_people_on_some_side_decide_nothing(plaza: pd.DataFrame) -
         assert found.verdict.startswith("not decidable")
 
 
-def test_a_shape_is_a_difference_from_the_null_model(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(sampling, "_MOST_BLOCKS", 2)
+def test_a_shape_is_a_difference_from_the_null_model() -> None:
     crowd, null = passing_pairs(1000, 1), null_of(passing_pairs(2000, 0))
     people = respecting(crowd, szlib.Ellipse((0.0, 0.0), (0.9, 0.7)), careless=0.05)
     ahead, growth = claims.measure_shape(people, null)
