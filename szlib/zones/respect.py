@@ -51,8 +51,8 @@ from .sampling import Draws
 # Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
 # a row, for other reasons than respect, which a shift in time removes as well. Who stands has no heading.
 _KINDS = ("opposite", "crossing")
-# Twice the logarithm of the posterior density of a zone over that of none: of 23 crowds on straight lines, none
-# has more than 32.
+# Twice the logarithm of the posterior density of a zone over that of none: of 23 crowds on straight lines,
+# none has more than 32.
 _MIN_EVIDENCE = 35.0
 # encounters drawn from the null model, at least and at most; else two for each
 _NULL_DRAWN = (4000, 8000)
