@@ -432,9 +432,9 @@ groups.agg(
 # %% [markdown]
 # ## Around groups, not through them
 #
-# Who walks between two people of a group disturbs them. ETH and THOR-MAGNI have labels that say who belongs together. On
-# the recorded ways there (`python -m studies.group_ways`), how often does the robot walk between two people of one group
-# who are within 3 m of each other? It is given the labels, or finds groups by distance and motion, or takes
+# A robot that walks between two people of a group disturbs them. ETH and THOR-MAGNI have labels that say which people
+# belong together. On the recorded ways there (`python -m studies.group_ways`), how often does the robot walk between two
+# people of one group, at most 3 m from each other? It is given the labels, or finds groups by distance and motion, or takes
 # everybody for single. The recorded people did it, too.
 
 # %% jupyter={"source_hidden": true}

@@ -2,15 +2,15 @@
 
 import posixpath
 import re
-import shutil
 import sys
 from itertools import chain
 from pathlib import Path
 
 import jupytext
 import nbformat
+import numpy as np
 from nbclient import NotebookClient
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from szlib.workbook import folders, runner
 
@@ -73,11 +73,14 @@ def copy_picture(figure: Path, name: str, colours: int = 128) -> None:
     """Copy a `figure` of the last run to the pictures of the README, with fewer colours, so that it is small."""
     target = HERE / "figures" / name
     target.parent.mkdir(exist_ok=True)
-    if figure.suffix == ".gif":
-        shutil.copyfile(figure, target)
-    else:
-        few = Image.open(figure).convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE, kmeans=1)
-        few.save(target, optimize=True)
+    film = Image.open(figure)
+    frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(film)]
+    # one palette for all frames, so that what does not move is stored once
+    together = Image.fromarray(np.vstack(frames[::5]))
+    palette = together.quantize(colours, Image.Quantize.MAXCOVERAGE, kmeans=1)
+    first, *more = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
+    moving = {"append_images": more, "duration": film.info["duration"], "loop": 0} if more else {}
+    first.save(target, optimize=True, save_all=bool(more), **moving)
 
 
 def main(names: list[str]) -> None:
@@ -95,7 +98,8 @@ def main(names: list[str]) -> None:
             refresh(source)
     for name, figure in PICTURES.items():
         if not names or any(folders.has_name(Path(figure.partition("-")[0]), number) for number in names):
-            copy_picture(LAB / "synthetic" / "figures" / figure, name)
+            few = 32 if name.endswith(".gif") else 128
+            copy_picture(LAB / "synthetic" / "figures" / figure, name, colours=few)
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ def test_the_wheel_holds_the_workbook_and_stays_small(wheel: zipfile.ZipFile) ->
         for each in wheel.infolist()
         if "/notebooks/" in each.filename
     )
-    assert size < 670_000, f"{size} bytes"
+    assert size < 650_000, f"{size} bytes"
 
 
 def test_the_build_leaves_the_tree_as_it_was(wheel: zipfile.ZipFile) -> None:
