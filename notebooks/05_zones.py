@@ -13,7 +13,7 @@
 #     label: zones
 #     paper: sec. 2, fig. 5
 #     aim: estimate a zone that does not shrink with more data, and say how far to trust it.
-#     asks: Which zone should a robot keep, and how far can it be trusted?
+#     asks: How near do most people come, and how far can such a number be trusted?
 #     needs:
 #     - '04'
 #     exercises:
@@ -26,7 +26,7 @@
 # %% [markdown]
 # # 5 - Social zones
 #
-# **Question.** Which zone should a robot keep, and how far can it be trusted?
+# **Question.** How near do most people come, and how far can such a number be trusted?
 #
 # **Expectation.** One careless person shrinks the hull. The distance that 95 of 100 people keep hardly changes when
 # more people come. According to the paper the zone reaches farther ahead than behind.
@@ -51,7 +51,7 @@ seed = 0
 results = "../results"
 r_max = 2.0  # as in chapter 03 [m]
 q = 0.05  # share of the encounters in a direction that may enter the quantile zone there
-zone_speed = 1.1  # whose zone the robot keeps [m/s]
+zone_speed = 1.1  # of the zone [m/s]
 
 # %% jupyter={"source_hidden": true}
 # Set-up, and the figure
@@ -62,22 +62,23 @@ import numpy as np
 from IPython.display import Markdown
 from laboratory import show_sliders
 from studies import paper_claims as claims
-from studies import real_day
+from studies import quantile_zone, real_day
 
 import szlib
 from szlib.plaza.settings import PlazaSettings
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
-from szlib.zones.polar import DIRECTIONS
-from szlib.zones.quantile import smooth_paths
+from szlib.zones.ellipses import DIRECTIONS
+from szlib.zones.smoothing import smooth_paths
 
-warnings.simplefilter("ignore", szlib.DataWarning)  # the verdict says it
+warnings.simplefilter("ignore", szlib.DataWarning)  # few people on a side: the intervals say it
 record = NotebookRecord("05_zones", globals())
 samples = record.cache.encounters()
-zone = record.cache.fit_zone()
+fit = record.cache.method.fit_options()
+zone = szlib.SocialZone.fit(samples, method=quantile_zone.NAME, q=q, seed=seed, **fit)
 settings = PlazaSettings()
 truth = {v: settings.true_zone(v) for v in zone.ellipses} if record.cache.is_synthetic else {}
-kept, verdict = zone.ellipse(zone_speed), zone.verdict(zone_speed)
+kept = zone.ellipse(zone_speed)
 bands = zone.uncertainty.bands[zone.uncertainty.bands["speed"] == zone_speed]
 degrees = np.degrees(bands["direction"].to_numpy())
 
@@ -88,9 +89,8 @@ def distance_by_direction(ellipse):
 
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(11, 3.7), layout="constrained", width_ratios=(1, 1.5))
-line = "-" if verdict == "usable" else "--"
 for ax, shown in ((left, kept.curve().T), (right, (degrees, distance_by_direction(kept)))):
-    ax.plot(*shown, line, color=figures.BLUE, linewidth=2, label="zone of the robot")
+    ax.plot(*shown, color=figures.BLUE, linewidth=2, label="quantile zone")
 if truth:
     left.plot(*truth[zone_speed].curve().T, ":", color=figures.RED, linewidth=2)
     right.plot(
@@ -107,18 +107,17 @@ right.fill_between(
     bands["high"],
     color=figures.ORANGE,
     alpha=0.5,
-    label="95 % interval of the robot's zone",
+    label="95 % interval of the quantile zone",
 )
 left.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
-figures.label_metres(left, f"The zone at {zone_speed:g} m/s: {verdict}", person=True)
+figures.label_metres(left, f"Where 5 % come nearer, at {zone_speed:g} m/s", person=True)
 right.set(
     xlabel="direction [deg] (0 is ahead, 90 left)",
     ylabel="reach of the zone [m]",
     xticks=range(-180, 181, 90),
 )
 widths = 100 * (bands["high"] - bands["low"])
-what = "where 5 % come nearer" if zone.method == "quantile" else "the same, unrolled"
-right.set_title(f"{what.capitalize()}: the interval is {widths.min():.0f} to {widths.max():.0f} cm wide")
+right.set_title(f"The same, unrolled: the interval is {widths.min():.0f} to {widths.max():.0f} cm wide")
 right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 record.figure(fig, "zone")
 
@@ -129,7 +128,7 @@ parameters(
         ("q", q, ASSUMED, "share of the encounters in a direction that may enter the zone there"),
         ("sector", "35 deg", ASSUMED, "25 to 45 deg do as well"),
         ("speeds pooled", "0.2 m/s slower to faster", ASSUMED, "few people walk at exactly one speed"),
-        ("the robot's zone", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
+        ("walking speed", f"{zone_speed:g} m/s", PAPER, "sec. 4: that of the zone that the robot keeps"),
         ("r_max", f"{r_max:g} m", PAPER, "see chapter 03"),
     ]
 )
@@ -143,16 +142,16 @@ real_day.compare_with_plaza(
     record,
     {
         "encounters": f"{samples['encounter'].nunique():,}",
-        f"zone at {zone_speed:g} m/s": "{:.2f} m x {:.2f} m".format(*kept.semi_axes),
+        f"quantile zone at {zone_speed:g} m/s": "{:.2f} m x {:.2f} m".format(*kept.semi_axes),
         "95 % interval of the longer semi-axis": f"{row['a_low']:.2f} to {row['a_high']:.2f} m",
-        "verdict": str(verdict),
     },
-    note=f"The verdict is *{verdict}*. " + "; ".join(verdict.reasons) + ".",
+    note="Chapter 06 compares with chance, and says whether a zone of this data can be used.",
 )
 
 # %% [markdown]
 # The band is an interval of **where 5 % come nearer**, not of the zone that people keep (dotted). The two differ by some
-# centimetres, and "Does it find the true zone?" says why. Chapter 06 has an interval that is meant to hold the truth.
+# centimetres, and "Does it find the true zone?" says why. The zone of the robot comes in chapter 06, with an interval that
+# is meant to hold the truth.
 #
 # ## A number first
 #
@@ -194,7 +193,7 @@ by_hand = radius_by_direction(samples, zone_speed)
 
 # %%
 fitted = szlib.SocialZone.fit(
-    samples, method="quantile", q=q, r_max=r_max, speeds=[zone_speed], n_resamples=0
+    samples, method=quantile_zone.NAME, q=q, r_max=r_max, speeds=[zone_speed], n_resamples=0
 )
 library = fitted.shape.radii[0]
 print(f"by hand minus library: {np.nanmin(by_hand - library):+.3f} to {np.nanmax(by_hand - library):+.3f} m")
@@ -237,7 +236,7 @@ and after. The largest difference between the ten lines and the library, both on
 fig, ax = plt.subplots(figsize=(7.5, 3.9), layout="constrained")
 unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
 ax.plot(*(library[:, None] * unit).T, ".", color=figures.GREY, markersize=7, label="radius in a direction")
-ax.plot(*kept.curve().T, line, color=figures.BLUE, linewidth=2, label="fitted ellipse")
+ax.plot(*kept.curve().T, color=figures.BLUE, linewidth=2, label="fitted ellipse")
 if truth:
     ax.plot(*truth[zone_speed].curve().T, ":", color=figures.RED, linewidth=2, label="truth")
 ax.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
@@ -316,12 +315,11 @@ everyone = samples["encounter"].unique()
 order = np.random.default_rng(seed).permutation(everyone)
 sizes = [n for n in (150, 300, 600, 1200) if n < 0.8 * len(everyone)] + [len(everyone)]
 options = {"r_max": r_max, "n_resamples": 100}
-fit = record.cache.method.fit_options()
 paper = szlib.SocialZone.fit(samples, method="paper", speeds=fit["speeds"], **options)
 found = {"paper": {}, "quantile": {}}
 for n in sizes:
     part = samples[samples["encounter"].isin(order[:n])]
-    for method, more in (("paper", {}), ("quantile", {"q": q})):
+    for method, more in (("paper", {}), (quantile_zone.NAME, {"q": q})):
         try:
             one = szlib.SocialZone.fit(part, method=method, speeds=[zone_speed], **options, **more)
         except szlib.ZoneError:  # too few people on some side
@@ -357,27 +355,9 @@ record.figure(fig, "sizes")
 #
 # With some hundred encounters the quantile levels out, and its interval lies around it. The hull is an *extreme*: the
 # nearest people who ever came. More people can only bring nearer ones. So its interval, which should contain the hull
-# of *all* people there are, lies below the estimate itself. The robot keeps the quantile zone, unless the data is rich
-# enough for the estimate of chapter 06.
+# of *all* people there are, lies below the estimate itself.
 #
 # </details>
-
-# %% [markdown]
-# ## The verdict
-#
-# Any method finds a zone, in any data. So the library states in words whether it can be used:
-#
-# - **usable**: people avoid each other more than by chance, there are at least 600 encounters and 20 on each side, no
-#   interval is wide, and the zone is clearly larger than bodies that touch and than what the sensor alone explains;
-# - **undecided**: something is missing, and the reasons say what;
-# - **no respect shown**: people came as near as people who ignore each other.
-#
-# Chapter 06 explains the test against chance, its *p* and its shifts. In the table, `a` and `b` are the longer and the
-# shorter semi-axis [m]; `a_low` and `a_high` are the ends of the interval of `a`.
-
-# %%
-print(zone.verdict(zone_speed).sentence)
-zone.table()[["speed", "a", "a_low", "a_high", "b", "verdict"]].round(2)
 
 # %% [markdown]
 # ## The zone at each walking speed
@@ -409,7 +389,8 @@ record.figure(fig, "zones")
 
 # %%
 def draw_zone(speed: float) -> plt.Axes:
-    ax = figures.plot_zone(zone, speed)
+    ax = figures.label_metres(plt.subplots()[1], f"Where 5 % come nearer, at {speed:g} m/s", person=True)
+    ax.plot(*zone.ellipse(speed).curve().T, color=figures.BLUE)
     ax.set(xlim=(-2, 2), ylim=(-2, 2))
     return ax
 
@@ -479,8 +460,8 @@ Markdown(
 | encounters | {len(everyone):,} | {atc["encounters"]:.0f} | 16,181 |
 | hull at {zone_speed:g} m/s, longer semi-axis | {hull.semi_axes[0]:.2f} m | {atc["hull_a"]:.2f} m (1.1 m/s) | only a figure, no number |
 
-No zone of the real day is usable at any speed. The verdict of its copy names the reasons: {atc["encounters"]:.0f} encounters where 600 are
-needed, fewer than 20 people on several sides, many groups, and a tracker that loses people who are nearer than 1 m."""
+With {atc["encounters"]:.0f} encounters the real day has fewer than 20 people on several sides. Chapter 06 finds more in it, and says what
+stands against its zone."""
 )
 
 # %% jupyter={"source_hidden": true}
@@ -499,8 +480,8 @@ Markdown(
 - **"With 95 % the true zone is in the interval."** No. The interval says how far the *estimate* moves when other people
   come. What is wrong with the method for any people, it does not see: most people leave a few centimetres more than the
   zone demands, and no data says how many.{outside}
-- **"A narrow interval means a usable zone."** No. People who ignore each other have a zone with a narrow interval too.
-  Chapter 06 compares with them, and the verdict demands it."""
+- **"A narrow interval means that people keep out."** No. People who ignore each other have a zone with a narrow interval
+  too. Chapter 06 compares with them."""
 )
 
 # %% jupyter={"source_hidden": true}
@@ -510,8 +491,8 @@ Markdown(
     f"""**What we know now.** At {zone_speed:g} m/s the zone is {kept.semi_axes[0]:.2f} m x {kept.semi_axes[1]:.2f} m. In each
 direction some {100 * q:g} % of the encounters come nearer. These are different encounters in each direction, so more than
 {100 * q:g} % enter the zone somewhere. Other people would have given {row["a_low"]:.2f} to {row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
-semi-axis changed by {100 * (last - first):+.0f} cm. The verdict is *{verdict}*, and the zone is stored in `zone.json`: the robot of
-chapters 07 to 13 reads it there. Do people keep out of this zone, or is it only empty? Chapter 06 asks."""
+semi-axis changed by {100 * (last - first):+.0f} cm. This describes where people were. Do they keep out of this zone, or is it only empty?
+Chapter 06 asks, and estimates the zone that the robot keeps."""
 )
 
 # %% jupyter={"source_hidden": true}

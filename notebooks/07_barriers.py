@@ -15,7 +15,7 @@
 #     aim: turn a distance into a condition on the next step, and say what gamma does.
 #     asks: How does a controller obey "stay out"? How is it built, line by line?
 #     needs:
-#     - '05'
+#     - '06'
 #     exercises:
 #     - '4.2'
 #     - 5.1-5.4

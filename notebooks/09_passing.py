@@ -86,7 +86,7 @@ scenario_runs.list_parameters(settings)
 #
 # A *chain* is a zone together with a controller. Orange is the paper's chain: its zone (outliers by LOF, hull, smallest
 # ellipse) and its controller. gamma and a_max are ours, since the paper gives none. Blue is our chain: our zone
-# (chapter 05) and our controller. What matters here is that our controller has the *rule of the side*: while the
+# (chapter 06) and our controller. What matters here is that our controller has the *rule of the side*: while the
 # goal lies behind a person, the robot drives towards a point beside the person. Chapter 11 lists the other
 # differences. The table has one more row: the paper's chain with the zone that it gives for a day of the ATC mall, where
 # the paper's people were recorded. Everybody can load this zone, without the data: `szlib.reference_zone("atc-paper")`.

@@ -88,7 +88,7 @@ scenario_runs.list_parameters(
 # ## The paper's chain, and ours
 #
 # As in chapter 09, orange is the paper's chain, its zone and its controller; gamma and a_max are ours, since the paper
-# gives none. Blue is our zone (chapter 05) and our controller. In the paper's chain the tilt of the zone chooses the
+# gives none. Blue is our zone (chapter 06) and our controller. In the paper's chain the tilt of the zone chooses the
 # side, in ours the rule of the side (chapter 09).
 
 # %%

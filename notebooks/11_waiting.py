@@ -106,7 +106,7 @@ scenario_runs.list_parameters(
 # ## The paper's chain, and ours
 #
 # As in chapter 09, orange is the paper's chain, its zone and its controller; gamma and a_max are ours, since the paper
-# gives none. Blue is our zone (chapter 05) and our controller. Here both do nearly the same: our rule of
+# gives none. Blue is our zone (chapter 06) and our controller. Here both do nearly the same: our rule of
 # the side changes only where the robot steps aside. The same five numbers describe a run in chapters 09 to 11:
 
 # %%

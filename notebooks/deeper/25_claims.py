@@ -64,6 +64,7 @@ from studies import claims as claims_study
 from studies import imposed as imposed_study
 from studies import paper_claims as claims
 from studies import plazas as plazas_study
+from studies import quantile_zone
 from studies import zones as zones_study
 from studies.distances import compare_distances
 from studies.folds import fold_table
@@ -128,7 +129,7 @@ speeds = (0.7, zone_speed, 1.3)
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # what is not adequate cannot decide, and says so
     fit = partial(szlib.SocialZone.fit, samples, r_max=r_max, speeds=speeds, n_resamples=resamples, seed=seed)
-    zone = fit(method="quantile", q=record.cache.method.q)
+    zone = fit(method=quantile_zone.NAME)
 
 # %%
 found, methods = [claims.measure_passing_side(samples)], ["-"]
@@ -239,7 +240,8 @@ record.check(
 # | `"respect"` | careful people keep out, compared with people who ignore each other | stable; needs a null model |
 #
 # Without `method`, szlib takes the respect zone if the data has 150 encounters, if the null model has twice as many, and if
-# they show respect. Else it takes the quantile zone, as on the plaza, where few people would meet by chance.
+# they show respect. Else it takes the paper's, as a description. The quantile is beside the notebooks, in
+# `studies/quantile_zone.py`: importing this file adds it to `szlib.SocialZone.fit`.
 # `"paper"` is the hull after LOF with 20 neighbours removed 0.2 % of the samples (chapter 03).
 #
 # Each zone has 95 % intervals from resampled pairs of people. With fewer than 20 encounters on some side, using it

@@ -27,7 +27,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from scipy.stats import t as student_t
 from studies import paper_claims as claims
-from studies import sites
+from studies import quantile_zone, sites
 from studies.committed import study, write_table
 from studies.plaza_truth import true_kinds
 from studies.pooling import pool
@@ -203,9 +203,12 @@ def measure_density(tracks: pd.DataFrame, area: szlib.Square) -> claims.Finding:
 def later(strangers: pd.DataFrame, null: szlib.NullEncounters) -> tuple[claims.Finding, str]:
     """What a larger zone costs the robot, with the zone of this site, and the method of that zone."""
     try:
-        zone = szlib.SocialZone.fit(strangers, null=null, speeds=(SPEED,), n_resamples=0)
+        options = {"null": null, "speeds": (SPEED,), "n_resamples": 0}
+        zone = szlib.SocialZone.fit(strangers, **options)
+        if zone.method != "respect":
+            zone = szlib.SocialZone.fit(strangers, method=quantile_zone.NAME, **options)
     except szlib.SzlibError as error:
-        return undecided(DELAYED_BY_SIZE, strangers, error), "quantile"
+        return undecided(DELAYED_BY_SIZE, strangers, error), quantile_zone.NAME
     found = claims.measure_delay_by_size(zone.ellipses[SPEED])
     return replace(found, claim=DELAYED_BY_SIZE, adequate=zone.adequate(SPEED)), zone.method
 
@@ -231,7 +234,9 @@ def of_quantile(
     for claim in asked:
         measure, speeds = CLAIMS[claim]
         try:
-            zone = szlib.SocialZone.fit(people, method="quantile", speeds=speeds, n_resamples=resamples)
+            zone = szlib.SocialZone.fit(
+                people, method=quantile_zone.NAME, speeds=speeds, n_resamples=resamples
+            )
             found[claim] = measure(zone)
         except szlib.SzlibError as error:
             found[claim] = undecided(claim, people, error)
@@ -240,7 +245,7 @@ def of_quantile(
 
 VARIED: dict[str, Mapping[str, Sequence[float]]] = {
     "paper": FIT,
-    "quantile": {"r_max": (1.5, 2.5), "q": (0.02, 0.1)},
+    quantile_zone.NAME: {"r_max": (1.5, 2.5), "q": (0.02, 0.1)},
 }
 """Options of each method that are varied, and their values besides the defaults."""
 

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies import quantile_zone
 from studies.claims import SITES
 from studies.committed import study, write_table
 from studies.replay import ReplacedWalker, Replays, find_replays
@@ -212,7 +213,8 @@ def walkers(made: Replays) -> pd.DataFrame:
 def zone_of(site: str) -> szlib.Ellipse:
     """The zone at 1.1 m/s fitted to a site: the plaza's to itself, the ATC day's to all real people."""
     load, square = SITES[site]
-    return szlib.SocialZone.fit(szlib.find_encounters(load(), square=square)).ellipse(1.1)
+    samples = szlib.find_encounters(load(), square=square)
+    return szlib.SocialZone.fit(samples, method=quantile_zone.NAME).ellipse(1.1)
 
 
 def promises(rows: pd.DataFrame) -> pd.DataFrame:

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from studies import quantile_zone
 from studies.committed import study, write_table
 from studies.imposed_zone import PairedSamples
 from studies.respect import data_and_null
@@ -84,7 +85,7 @@ def describe_case(
     true, found = measure(ellipse), []
     for draw in range(draws):
         samples, model = draw_case(null, SHIFTS_DRAWN[site], ellipse, careless, n, draw)
-        for method in ("respect", "quantile"):
+        for method in ("respect", quantile_zone.NAME):
             with warnings.catch_warnings(action="ignore", category=szlib.DataWarning):
                 zone = szlib.SocialZone.fit(
                     samples, method=method, null=model, speeds=(SPEED,), n_resamples=300

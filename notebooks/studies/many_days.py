@@ -19,13 +19,16 @@ from pathlib import Path
 import joblib
 import numpy as np
 import pandas as pd
+from studies import quantile_zone
 from studies.committed import study, write_table
 
 import szlib
 from szlib.encounters import Extraction
 
 EXTRACTIONS = ("1 process", "4 processes", "4 Dask workers")
-FITS = tuple(f"{method}, {n} samples" for n in (16_000, 81_000, 326_000) for method in ("quantile", "paper"))
+FITS = tuple(
+    f"{method}, {n} samples" for n in (16_000, 81_000, 326_000) for method in (quantile_zone.NAME, "paper")
+)
 
 
 def extract(task: str, days: list[Path], out: Path) -> dict[str, float]:

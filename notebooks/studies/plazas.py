@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from studies import quantile_zone
 from studies.committed import study, write_table
 from studies.respect import stored
 
@@ -116,7 +117,7 @@ def compare(
     `more`: as of `SocialZone.fit`; without resamples there is no interval.
     """
     true = dict(zip(("center_x", "a", "b"), (truth.center[0], *truth.semi_axes), strict=True))
-    for method in ("respect", "quantile"):
+    for method in ("respect", quantile_zone.NAME):
         options = {"null": null} if method == "respect" else {}
         with warnings.catch_warnings(action="ignore", category=szlib.DataWarning):
             zone = szlib.SocialZone.fit(samples, method=method, speeds=(SPEED,), **options, **more)

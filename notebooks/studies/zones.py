@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies import quantile_zone
 from studies.claims import SITES
 from studies.committed import study, write_table
 
@@ -51,7 +52,7 @@ CASES: dict[str, dict[str, Any]] = {
     "2 % intruders, 5 cm of noise": {"intruders": 0.02, "noise": 0.05},
 }
 METHODS: dict[str, dict[str, Any]] = {
-    "quantile": {"method": "quantile"},
+    "quantile": {"method": quantile_zone.NAME},
     "hull": {"method": "hull"},
     "paper": {"method": "paper"},
 }
@@ -147,7 +148,9 @@ def outside(clearance: float, q: float, plazas: int, **more: Any) -> np.ndarray:
     """How far the semi-axes of plazas pooled lie outside of the truth, mean over speeds (2,) [m]."""
     settings = {"clearance": clearance, **TRUTHS["centred"], **more}
     samples, _, known = zip(*(people(seed, **settings) for seed in range(plazas)), strict=True)
-    zone = szlib.SocialZone.fit(pooled(list(samples)), speeds=SPEEDS, q=q, n_resamples=0)
+    zone = szlib.SocialZone.fit(
+        pooled(list(samples)), method=quantile_zone.NAME, speeds=SPEEDS, q=q, n_resamples=0
+    )
     off = [np.subtract(zone.ellipses[v].semi_axes, known[0].true_zone(v).semi_axes) for v in SPEEDS]
     return np.mean(off, axis=0)
 
@@ -200,7 +203,7 @@ def sizes(plazas: int) -> pd.DataFrame:
 
 def judge_pooled(days: list[pd.DataFrame]) -> dict[str, float]:
     """Number of encounters, and error of the quantile [m], of plazas pooled."""
-    zone = szlib.SocialZone.fit(pooled(days), method="quantile", speeds=SPEEDS, n_resamples=0)
+    zone = szlib.SocialZone.fit(pooled(days), method=quantile_zone.NAME, speeds=SPEEDS, n_resamples=0)
     return {
         "encounters": sum(day["encounter"].nunique() for day in days),
         "error_m": error(zone, PlazaSettings()),

@@ -10,9 +10,8 @@ import numpy as np
 from ..core.checks import Array, require
 from ..core.errors import DataError, ZoneError
 from ..encounters.geometry import ATC_SQUARE, AttentionalSpace, Square
-from ..zones.ellipses import Ellipse
+from ..zones.ellipses import Ellipse, ellipse_reach
 from ..zones.outliers import R_MAX
-from ..zones.polar import ellipse_reach
 
 # lowest speed of a walking person [m/s]; the paper has speeds from 0.4 m/s
 MIN_WALKING_SPEED = 0.45

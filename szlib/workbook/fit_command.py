@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -76,64 +77,17 @@ def fit(
     from matplotlib.figure import Figure
 
     file = _require_place(Path(out))
-    if any(folder_purpose(path) == several_days.PURPOSE for path in paths):
-        if len(paths) > 1:
-            raise DataError(
-                f"{' '.join(paths)}: give one folder of extracted days, or files of tracks"
-            )
-        days = Extraction.load(paths[0], exclude=exclude)
-        samples, settings, reading = days.samples(), days.settings, days.recipe
-        of_days = [
-            list(content)
-            for source in days.sources.values()
-            for content in source["files"]
-        ]
-        files = datasets.find(tracks) if tracks else []
-        if other := [
-            each for each in files if [each.name, *file_content(each)] not in of_days
-        ]:
-            raise DataError(
-                f"{printable(other[0])}: is none of the files of the extracted days, unchanged"
-            )
-        table = read_tracks(files, recipe=reading) if files else None
-    else:
-        if tracks or exclude:
+    # the verdicts say what the warnings say
+    with warnings.catch_warnings(action="ignore", category=DataWarning):
+        if any(folder_purpose(path) == several_days.PURPOSE for path in paths):
+            samples, table, settings = _read_days(paths, tracks, exclude)
+            zone = _fit_lone_encounters(samples, table, settings, method, kind, jobs)
+        elif tracks or exclude:
             raise DataError(
                 f"--tracks and --exclude belong to a folder of extracted days; {paths[0]} is none"
             )
-        files = datasets.find(paths)
-        settings = replace(
-            settings, area=several_days.known_area(settings, files, reading) or AUTO
-        )
-        table = read_tracks(files, recipe=reading)
-        samples = find_encounters(table, settings=settings)
-        advice = several_days.relax_conditions(samples, lambda: table, settings)
-        several_days.require_encounters(samples, advice)
-    samples, null = of_kind(samples, kind), None
-    if table is not None:
-        null = find_null_model(
-            table,
-            samples,
-            settings,
-            r_max=R_MAX,
-            kinds=kind,
-            n_jobs=jobs,
-            progress=True,
-        )
-    elif method == "respect":
-        raise DataError(f"method respect needs a null model; {NO_TRACKS}")
-    try:
-        with warnings.catch_warnings(
-            action="ignore", category=DataWarning
-        ):  # the verdicts say the same
-            zone = SocialZone.fit(
-                samples, method=method, null=null, n_resamples=N_RESAMPLES
-            )
-    except (ZoneError, DataError) as error:
-        missing = describe_missing_encounters(
-            {"encounters": samples["encounter"].nunique()}
-        )
-        raise ZoneError("; ".join(filter(None, [str(error), missing]))) from error
+        else:
+            zone, table = _fit_files(paths, settings, reading, method, kind, jobs)
     figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
     zone.plot(SPEED if SPEED in zone.ellipses else None, ax=figure.subplots())
     figure.savefig(content, format="png", dpi=150)
@@ -144,12 +98,81 @@ def fit(
     verdict = f"zone at {SPEED:g} m/s: {zone.verdict(SPEED).sentence}"
     return "\n".join(
         [
-            f"method {zone.method}",
+            f"method {zone.meaning}",
             format_table(zone).to_string(index=False),
             *notes,
             verdict,
         ]
     )
+
+
+def _read_days(
+    paths: Sequence[str], tracks: Sequence[str], exclude: Sequence[str]
+) -> tuple[pd.DataFrame, pd.DataFrame | None, EncounterSettings]:
+    """The encounters of extracted days, the table of their `tracks` (None without), and their settings."""
+    if len(paths) > 1:
+        raise DataError(
+            f"{' '.join(paths)}: give one folder of extracted days, or files of tracks"
+        )
+    days = Extraction.load(paths[0], exclude=exclude)
+    sources = days.sources.values()
+    of_days = [list(content) for source in sources for content in source["files"]]
+    files = datasets.find(tracks) if tracks else []
+    if other := [
+        each for each in files if [each.name, *file_content(each)] not in of_days
+    ]:
+        raise DataError(
+            f"{printable(other[0])}: is none of the files of the extracted days, unchanged"
+        )
+    table = read_tracks(files, recipe=days.recipe) if files else None
+    return days.samples(), table, days.settings
+
+
+def _fit_files(
+    paths: Sequence[str],
+    settings: EncounterSettings,
+    reading: Recipe,
+    method: str | None,
+    kind: Sequence[str] | None,
+    jobs: int,
+) -> tuple[SocialZone, pd.DataFrame]:
+    """Fit a zone to files of tracks: ours to every pair of people, the others to lone encounters."""
+    files = datasets.find(paths)
+    area = several_days.known_area(settings, files, reading) or AUTO
+    table, settings = read_tracks(files, recipe=reading), replace(settings, area=area)
+    if method in (None, "respect"):
+        options: Any = {"kinds": kind, "method": method, "progress": True}
+        return SocialZone.from_tracks(table, area=area, **options), table
+    samples = find_encounters(table, settings=settings)
+    advice = several_days.relax_conditions(samples, lambda: table, settings)
+    several_days.require_encounters(samples, advice)
+    return _fit_lone_encounters(samples, table, settings, method, kind, jobs), table
+
+
+def _fit_lone_encounters(
+    samples: pd.DataFrame,
+    table: pd.DataFrame | None,
+    settings: EncounterSettings,
+    method: str | None,
+    kind: Sequence[str] | None,
+    jobs: int,
+) -> SocialZone:
+    """Fit a zone to lone encounters, with their null model where there is a track `table`."""
+    samples, null = of_kind(samples, kind), None
+    if table is not None:
+        options: Any = {"kinds": kind, "n_jobs": jobs, "progress": True}
+        null = find_null_model(table, samples, settings, r_max=R_MAX, **options)
+    elif method == "respect":
+        raise DataError(f"method respect needs a null model; {NO_TRACKS}")
+    try:
+        return SocialZone.fit(
+            samples, method=method, null=null, n_resamples=N_RESAMPLES
+        )
+    except (ZoneError, DataError) as error:
+        missing = describe_missing_encounters(
+            {"encounters": samples["encounter"].nunique()}
+        )
+        raise ZoneError("; ".join(filter(None, [str(error), missing]))) from error
 
 
 def format_table(zone: SocialZone) -> pd.DataFrame:

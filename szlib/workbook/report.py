@@ -197,7 +197,7 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
     table = zone.table()
     names = "^(speed|center_x|[ab](_low|_high)?|encounters|adequate|verdict)$"
     shown = table.filter(regex=names).round(2).to_html(index=False, border=0)
-    texts: dict[str, Any] = {"method": zone.method, "table": shown}
+    texts: dict[str, Any] = {"meaning": zone.meaning, "table": shown}
     if speed in zone.ellipses:
         figure, content = Figure(figsize=(4.8, 4.5), layout="constrained"), io.BytesIO()
         truth = PlazaSettings().true_zone(speed) if is_synthetic else None

@@ -1,12 +1,11 @@
 """How near is too near, and how certain is that: from samples of encounters to the minimum social zone.
 
-ellipses              ellipses in a person's frame
+ellipses              ellipses in a person's frame, one or one for each speed
 enclosing_ellipse     the smallest ellipse around points or a curve
 outliers              encounters, or samples, far from all others (local outlier factor)
+smoothing             paths smoothed over time, against the noise of a sensor
 estimators            what all estimators and shapes of zones have in common
-polar                 a zone given as a radius in each direction, and the ellipse fitted to it
 hulls                 the zone outside the convex hull over (x', y', speed): estimator "hull"
-quantile              the zone that all but a share of encounters stay outside: estimator "quantile"
 respect               the ellipse that careful people keep out of, by the null model: estimator "respect"
 respect_likelihood    its likelihood, and the posterior of its parameters
 respect_test          the test of the data against its null model, and the radius over all directions

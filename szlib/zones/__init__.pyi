@@ -1,11 +1,10 @@
-from .ellipses import BODY_RADIUS, Ellipse, circle_around
+from .ellipses import BODY_RADIUS, Ellipse, EllipseZone, circle_around
 from .enclosing_ellipse import (
     minimum_enclosing_ellipse,
     minimum_enclosing_ellipse_of_curve,
 )
 from .hulls import HullZone, hull_vertices, slice_hull
 from .outliers import complementary_points, is_outlier, remove_outliers
-from .polar import PolarZone
 from .reference_zones import ReferenceZone, reference_zone
 from .respect_test import NullTest, RespectRadius, null_test
 from .social_zone import SocialZone
@@ -14,9 +13,9 @@ from .uncertainty import count_by_side
 __all__ = [
     "BODY_RADIUS",
     "Ellipse",
+    "EllipseZone",
     "HullZone",
     "NullTest",
-    "PolarZone",
     "ReferenceZone",
     "RespectRadius",
     "SocialZone",

@@ -1,4 +1,4 @@
-"""Ellipses in the plane, and the zone of a person as an ellipse in that person's frame.
+"""Ellipses in the plane, and the zone of a person as ellipses, one for each speed, in that person's frame.
 
 An ellipse with centre (m, n), semi-axes a >= b and angle th is where (paper, eq. 6, with the sign of its
 second term corrected)
@@ -8,6 +8,7 @@ second term corrected)
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import cos, hypot, pi, sin
@@ -17,6 +18,9 @@ from numpy.typing import ArrayLike
 
 from ..core.checks import Array
 from ..core.errors import ZoneError
+
+DIRECTIONS: Array = np.radians(np.arange(-180.0, 180.0, 5.0))
+"""Directions around a person, counter-clockwise from ahead [rad]."""
 
 BODY_RADIUS = 0.25
 """Radius of a person's body: half the breadth of the shoulders [m] (assumed)."""
@@ -74,6 +78,11 @@ class Ellipse:
         """Area [m2]."""
         return float(np.pi * self.semi_axes[0] * self.semi_axes[1])
 
+    @property
+    def parameters(self) -> Array:
+        """Centre and semi-axes [m], angle [rad]: m, n, a, b, th, shape (5,)."""
+        return np.array([*self.center, *self.semi_axes, self.angle])
+
     @cached_property
     def foci(self) -> Array:
         """The two foci, shape (2, 2) [m], at c = sqrt(a^2 - b^2) from the centre (paper, sec. 3)."""
@@ -125,6 +134,93 @@ class Ellipse:
         cosine, sine = np.cos(heading), np.sin(heading)
         center = (x + m * cosine - n * sine, y + m * sine + n * cosine)
         return Ellipse(center, self.semi_axes, self.angle + heading)
+
+
+@dataclass(frozen=True, eq=False)
+class EllipseZone:
+    """A zone given as one ellipse for each of several speeds.
+
+    Between two speeds, centre and shape matrix R diag(a^2, b^2) R^T are linear.
+
+    Parameters
+    ----------
+    ellipses : by speed of the reference pedestrian [m/s].
+
+    Raises
+    ------
+    ZoneError : there is no ellipse.
+
+    Examples
+    --------
+    >>> from szlib.zones import Ellipse, EllipseZone
+    >>> zone = EllipseZone({0.9: Ellipse((0, 0), (1, 1)), 1.1: Ellipse((0.2, 0), (1, 1))})
+    >>> zone.ellipse(1.0).center
+    (0.1, 0.0)
+    """
+
+    ellipses: Mapping[float, Ellipse]
+
+    def __post_init__(self) -> None:
+        if not self.ellipses:
+            raise ZoneError("a zone needs an ellipse for one speed or more; got none")
+
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        """Lowest and highest speed with an ellipse [m/s]."""
+        return min(self.ellipses), max(self.ellipses)
+
+    def ellipse(self, speed: float) -> Ellipse:
+        """The ellipse at a `speed` [m/s]; raises ZoneError outside of the range."""
+        low, high = self.speed_range
+        if not low <= speed <= high:
+            raise ZoneError(
+                f"the zone at {speed:g} m/s is undefined: it was fitted for {low:g} to {high:g} m/s; "
+                "fit it with this speed in `speeds`"
+            )
+        below = max(v for v in self.ellipses if v <= speed)
+        above = min(v for v in self.ellipses if v >= speed)
+        if below == above:
+            return self.ellipses[below]
+        share = (speed - below) / (above - below)
+        ends = [self.ellipses[v] for v in (below, above)]
+        center = np.average(
+            [e.center for e in ends], axis=0, weights=(1 - share, share)
+        )
+        matrix = np.average(
+            [_matrix(e) for e in ends], axis=0, weights=(1 - share, share)
+        )
+        squares, axes = np.linalg.eigh(matrix)
+        b, a = np.sqrt(squares)
+        return Ellipse(tuple(center), (a, b), np.arctan2(axes[1, 1], axes[0, 1]))
+
+    def boundary(self, speed: float, theta: ArrayLike) -> Array:
+        """Boundary at a `speed` [m/s] in the directions `theta` (...) [rad], shape (..., 2) [m]."""
+        directions = np.asarray(theta, float)
+        reach = ellipse_reach(self.ellipse(speed).parameters, directions.ravel())
+        return np.asarray(
+            reach.reshape(directions.shape)[..., None] * unit_vectors(theta)
+        )
+
+
+def _matrix(ellipse: Ellipse) -> Array:
+    """The shape matrix of an `ellipse`, R diag(a^2, b^2) R^T, shape (2, 2) [m2]."""
+    axes = unit_vectors(ellipse.angle + np.array([0, np.pi / 2]))
+    return np.asarray((axes.T * np.square(ellipse.semi_axes)) @ axes)
+
+
+def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:
+    """Distance from the person to the boundary of `ellipses` in `directions` (n,) [rad].
+
+    `ellipses` (..., 5) hold centre, semi-axes [m] and angle [rad]. The result has the shape (..., n) [m]; it
+    is NaN if the person is outside the ellipse.
+    """
+    m, n, a, b, angle = np.moveaxis(ellipses[..., None, :], -1, 0)
+    cos, sin, turn = np.cos(angle), np.sin(angle), directions - angle
+    u, v = np.cos(turn) / a, np.sin(turn) / b
+    x, y = (m * cos + n * sin) / a, (n * cos - m * sin) / b
+    p, q, r = u * u + v * v, u * x + v * y, x * x + y * y - 1
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(r < 0, (q + np.sqrt(q * q - p * r)) / p, np.nan))
 
 
 def unit_vectors(theta: ArrayLike) -> Array:

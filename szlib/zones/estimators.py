@@ -16,7 +16,7 @@ from .ellipses import Ellipse
 
 
 class ZoneShape(Protocol):
-    """The boundary of a zone by speed and direction: a `HullZone` or a `PolarZone`."""
+    """The boundary of a zone by speed and direction: a `HullZone` or an `EllipseZone`."""
 
     @property
     def speed_range(self) -> tuple[float, float]:

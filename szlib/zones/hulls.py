@@ -24,7 +24,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..core.checks import Array
 from ..core.errors import ZoneError
 from ..tracks import funnels
-from .ellipses import Ellipse, unit_vectors
+from .ellipses import DIRECTIONS, Ellipse, unit_vectors
 from .enclosing_ellipse import (
     check_points,
     minimum_enclosing_ellipse,
@@ -32,7 +32,6 @@ from .enclosing_ellipse import (
 )
 from .estimators import Estimator
 from .outliers import complementary_points, encounter_numbers, remove_outliers
-from .polar import DIRECTIONS, missing_directions_error
 
 
 def hull_vertices(points: ArrayLike) -> Array:
@@ -288,16 +287,30 @@ class HullEstimator(Estimator):
                     ellipse = minimum_enclosing_ellipse(
                         boundary, start=start.get(j, [])
                     )
-                    ellipses[i, j] = [
-                        *ellipse.center,
-                        *ellipse.semi_axes,
-                        ellipse.angle,
-                    ]
+                    ellipses[i, j] = ellipse.parameters
                     is_support = (
                         (boundary[:, None] == ellipse.support).all(axis=-1).any(axis=1)
                     )
                     start[j] = np.flatnonzero(is_support).tolist()
         return ellipses
+
+
+def missing_directions_error(speed: float, known: Array) -> ZoneError:
+    """The error at a `speed` [m/s] if people were seen only in the directions `known`, ascending [rad]."""
+    low, high = np.degrees(find_widest_gap(known))
+    return ZoneError(
+        f"the zone at {speed:g} m/s is undefined: no person was seen in the directions from {low:.0f} "
+        f"counter-clockwise to {180 - (180 - high) % 360:.0f} deg; add data, or choose another speed"
+    )
+
+
+def find_widest_gap(known: Array) -> tuple[float, float]:
+    """The two of the `known` directions around the widest gap, counter-clockwise [rad]."""
+    if not len(known):
+        return -np.pi, np.pi
+    widths = np.diff(np.append(known, known[0] + 2 * np.pi))
+    widest = int(np.argmax(widths))
+    return float(known[widest]), float(known[widest] + widths[widest])
 
 
 def _reach(along: Array, offsets: Array) -> Array:

@@ -43,8 +43,8 @@ from ..core.checks import Array
 from ..core.errors import ZoneError
 from ..encounters.null_model import NullEncounters
 from ..tracks import funnels
+from .ellipses import Ellipse, EllipseZone, ellipse_reach
 from .estimators import Estimator
-from .polar import DIRECTIONS, PolarZone, ellipse_reach
 from .respect_likelihood import VIEWS, Likelihood, PairPaths, zone_ellipses
 from .sampling import Draws
 
@@ -150,7 +150,7 @@ class RespectEstimator(Estimator):
         r_max: float,
         null: NullEncounters | None,
     ) -> RespectEstimator | None:
-        """The estimator where it is better than the quantile, else None.
+        """The estimator where the data suffices for it and shows respect, else None.
 
         Within r_max, the data must hold 150 encounters of the kinds compared, and the null model twice as
         many as the data. The zone must fit better than none, and contain its person at all `speeds` [m/s].
@@ -194,12 +194,13 @@ class RespectEstimator(Estimator):
         likelihood = Likelihood.of(self.data, self.null)
         return likelihood.draw(self.best, np.random.default_rng(0))
 
-    def fit_shape(self, speeds: Sequence[float]) -> PolarZone:
-        """Fit the ellipses, and give their radii at `speeds`, ascending [m/s]."""
-        radii = ellipse_reach(zone_ellipses(self.best[None], speeds)[0])
-        if np.isnan(radii).any():
+    def fit_shape(self, speeds: Sequence[float]) -> EllipseZone:
+        """Fit the ellipses at `speeds`, ascending [m/s]."""
+        rows = zone_ellipses(self.best[None], speeds)[0]
+        if np.isnan(ellipse_reach(rows)).any():
             raise ZoneError("the respect zone does not contain its person; add data")
-        return PolarZone(np.array(speeds), DIRECTIONS, radii)
+        ellipses = [Ellipse(row[:2], row[2:4], row[4]) for row in rows]
+        return EllipseZone(dict(zip(speeds, ellipses, strict=True)))
 
     def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
         """Fit ellipses to encounters with `weights` at `speeds`, from the fit of all."""
@@ -228,9 +229,26 @@ class RespectEstimator(Estimator):
         )
 
     def posterior(self, speeds: Sequence[float]) -> Array:
-        """All ellipses drawn from the posterior at `speeds` (s,) [m/s], shape (k, s, 5)."""
+        """All ellipses drawn from the posterior at `speeds` (s,) [m/s], shape (k, s, 5).
+
+        Of a nearly round zone the longer axis of a draw is now the one, now the other. So the first semi-axis
+        of all draws is the one nearer to the longer one of the zone itself, even where it is the shorter one.
+        """
         ellipses = zone_ellipses(self.draws.values, speeds)
+        ellipses = np.where(_is_across(ellipses), _exchange_axes(ellipses), ellipses)
         mean, spread = ellipses.mean(axis=0), np.maximum(ellipses.std(axis=0), 1e-9)
-        return np.asarray(
-            mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)
-        )
+        wide = mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)
+        best = zone_ellipses(self.best[None], speeds)
+        return np.asarray(np.where(_is_across(best), _exchange_axes(wide), wide))
+
+
+def _is_across(ellipses: Array) -> Array:
+    """Whether the first semi-axis of `ellipses` (..., 5) is nearer to across than to along, (..., 1)."""
+    return np.asarray(np.abs(np.sin(ellipses[..., 4:])) > np.sqrt(0.5))
+
+
+def _exchange_axes(ellipses: Array) -> Array:
+    """The same `ellipses` (..., 5) with the other semi-axis first, its angle within 90 deg of ahead."""
+    m, n, a, b, angle = np.moveaxis(ellipses, -1, 0)
+    turned = np.where(angle > 0, angle - np.pi / 2, angle + np.pi / 2)
+    return np.stack([m, n, b, a, turned], axis=-1)

@@ -18,8 +18,8 @@ from threadpoolctl import ThreadpoolController
 from ..core.checks import Array, check_columns, check_rows
 from ..encounters.kinds import WALKING
 from .outliers import encounter_numbers
-from .quantile import smooth_paths
 from .sampling import Draws, sample
+from .smoothing import smooth_paths
 
 REFERENCE_SPEED = 1.1  # at which the parameters describe the ellipse [m/s]
 # slower and faster people carry the ellipse of these speeds [m/s]
@@ -53,6 +53,9 @@ _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [
 # number of best circles tried, and the least difference of their radii [m]
 _STARTS, _START_GAP = (3, 0.15)
 _RESTARTS = 10
+# How far back the centre is moved to look for another peak [m], and the least gain in log density for which
+# it is moved on.
+_BACK, _GAIN = ((-0.15, -0.1, -0.05, 0.05, 0.1, 0.15), 0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,12 +337,18 @@ class Likelihood:
     def find_best(self, rng: np.random.Generator) -> Array:
         """The maximum: the best of several starts, and of `_RESTARTS` starts around it drawn with `rng`.
 
-        The density has many small peaks, because each encounter adds an edge.
+        The density has many small peaks, because each encounter adds an edge. Some lie far apart: a zone
+        whose centre is farther back, and which is as much longer, reaches as far ahead. So these are tried.
         """
         best = self.maximise(self.starts())
         shifts = rng.normal(size=(_RESTARTS, len(best))) * _FIRST_SPREAD
         near = np.clip(best + shifts * (_HIGH - _LOW), _LOW, _HIGH)
-        return self.maximise([best, *near])
+        best = self.maximise([best, *near])
+        while True:
+            found = self.maximise([_move_back(best, metres) for metres in _BACK])
+            if self.cost(found)[0] > self.cost(best)[0] - _GAIN:
+                return best
+            best = found
 
     def starts(self) -> list[Array]:
         """The best circles of a grid of radii, edges and shares."""
@@ -382,6 +391,14 @@ class Likelihood:
             )
 
 
+def _move_back(p: Array, metres: float) -> Array:
+    """The parameters `p` with the centre so many `metres` farther back, and a reach ahead that stays."""
+    moved = p.copy()
+    moved[0] -= metres
+    moved[3] = np.log(max(np.exp(p[3]) + metres, np.exp(_LOW[3])))
+    return np.clip(moved, _LOW, _HIGH)
+
+
 @cache
 def threads() -> ThreadpoolController:
     """The threads of the loaded libraries; cached, because finding them takes as long as one fit."""
@@ -389,7 +406,7 @@ def threads() -> ThreadpoolController:
 
 
 def zone_ellipses(parameters: Array, speeds: Sequence[float]) -> Array:
-    """Ellipses (k, s, 5), as those of `fit_ellipses`, for `parameters` (k, 12) at `speeds` (s,) [m/s]."""
+    """Ellipses (k, s, 5), centre, semi-axes and angle, for `parameters` (k, 12) at `speeds` (s,) [m/s]."""
     p = np.asarray(parameters)[:, None, :]
     speed = np.clip(np.asarray(speeds, float), *_SPEED_BOUNDS) - REFERENCE_SPEED
     along, across = (

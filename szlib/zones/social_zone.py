@@ -2,10 +2,9 @@
 
 `SocialZone.fit` has these methods:
 
-quantile  all but a share q of the encounters stay outside; does not shrink as the data grows
+respect   careful people keep out, compared with people who ignore each other (ours)
 paper     (nearly) no person was ever inside: outliers, hull, slices, smallest ellipses (paper, sec. 2)
-hull      the same, but whole encounters are outliers, as many as there are (ours)
-respect   careful people keep out, compared with people who ignore each other
+hull      the same, but whole encounters are outliers, as many as there are
 
 A zone is written to a JSON file as a whole or not at all, with a checksum of its content, which is checked
 when it is read.
@@ -29,17 +28,18 @@ import pandas as pd
 
 from .. import __version__
 from ..core.checks import Array, check_columns, require
-from ..core.errors import SzlibError, ZoneError, warn
+from ..core.errors import DataError, SzlibError, ZoneError, warn
 from ..core.files import write_file
 from ..core.input_files import read_small, reading
-from ..encounters.null_model import NullEncounters
-from ..encounters.pairs import SensorCheck
-from .ellipses import Ellipse
+from ..encounters.finding import find_place
+from ..encounters.kinds import of_kind
+from ..encounters.null_model import NullEncounters, null_pairs
+from ..encounters.pairs import SensorCheck, find_pairs
+from ..encounters.settings import EncounterSettings
+from .ellipses import Ellipse, EllipseZone
 from .estimators import Estimator, ZoneShape
 from .hulls import HullEstimator, HullZone
 from .outliers import FRACTION, N_NEIGHBOURS, R_MAX, encounter_numbers
-from .polar import PolarZone
-from .quantile import QuantileEstimator
 from .respect import RespectEstimator
 from .respect_test import NullTest, RespectRadius, null_test
 from .uncertainty import (
@@ -58,12 +58,11 @@ if TYPE_CHECKING:
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
 
-FORMAT, VERSION = "szlib.SocialZone", 4
+FORMAT, VERSION = "szlib.SocialZone", 5
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
 # The methods of `SocialZone.fit`: the estimator, and its options.
 METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
-    "quantile": (QuantileEstimator.from_samples, ("q",)),
     "paper": (
         partial(
             HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS
@@ -81,7 +80,7 @@ class SocialZone:
 
     Parameters
     ----------
-    shape : the boundary by speed and direction, a `HullZone` or a `PolarZone`.
+    shape : the boundary by speed and direction, a `HullZone` or an `EllipseZone`.
     r_max : distance within which people count [m].
     ellipses : the fitted ellipse by speed.
     undefined : the reason why there is no zone, by speed.
@@ -113,7 +112,7 @@ class SocialZone:
     ellipses: dict[float, Ellipse]
     undefined: dict[float, str] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
-    method: str = "quantile"
+    method: str = "respect"
     side_counts: pd.DataFrame | None = None
     uncertainty: Uncertainty | None = None
     null_test: NullTest | None = None
@@ -155,6 +154,57 @@ class SocialZone:
         )
 
     @classmethod
+    def from_tracks(
+        cls,
+        tracks: pd.DataFrame,
+        *,
+        area: object = None,
+        kinds: str | Iterable[str] | None = None,
+        r_max: float = R_MAX,
+        shifts: int = 99,
+        seed: int = 0,
+        progress: bool = False,
+        **options: Any,
+    ) -> SocialZone:
+        """Fit the zones to every pair of people in a track table, against the same streams moved in time.
+
+        Parameters
+        ----------
+        tracks : a track table as from `szlib.read_tracks`.
+        area : as in `szlib.find_pairs`.
+        kinds : of pairs, as for `szlib.of_kind`, among those who come towards each other or cross.
+        r_max, seed : distance within which people count [m], and seed of shifts and intervals.
+        shifts, progress : as in `szlib.null_pairs`.
+        options : further ones of `fit`.
+
+        Raises
+        ------
+        DataError : as `szlib.null_pairs`; or no two people came within `r_max` of each other.
+        ZoneError : as `fit`.
+
+        Examples
+        --------
+        >>> import szlib
+        >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=600))
+        >>> zone = szlib.SocialZone.from_tracks(szlib.read_tracks(plaza), speeds=[1.1])
+        >>> zone.verdict(1.1), zone.method
+        ('usable', 'respect')
+        """
+        tracks, place = find_place(tracks, EncounterSettings(area=area))
+        kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
+        pairs = of_kind(find_pairs(tracks, area=place, r_max=r_max), kinds)
+        if pairs.empty:
+            raise DataError(
+                f"no two people, of the kinds compared, came within {r_max:g} m of each other in the area "
+                f"{place}: use more data, or give a larger area"
+            )
+        null = null_pairs(
+            tracks, area=place, shifts=shifts, seed=seed, r_max=r_max, progress=progress
+        )
+        options |= {"r_max": r_max, "seed": seed}
+        return cls.fit(pairs, null=null.of_kind(kinds), **options)
+
+    @classmethod
     def fit(
         cls,
         samples: pd.DataFrame,
@@ -173,21 +223,20 @@ class SocialZone:
         ----------
         samples : as from `szlib.find_encounters`: los_angle [rad], distance [m], speed [m/s], encounter. With
             ref_id and other_id, people are resampled, not encounters. With t, paths are smoothed.
-        method : "quantile", "paper", "hull" or "respect". "paper" is the paper's method to the letter: LOF
-            over samples with 20 neighbours removes 0.2 %, then hull, slices, ellipses. "hull" differs in one
-            step: it judges whole encounters and removes as many as are outliers. Both zones shrink as the
-            data grows; the others do not. None: "respect" if, within r_max, the data holds 150
-            encounters and the null model twice as many, and they show respect, else "quantile".
+        method : "respect", "paper" or "hull". "paper" is the paper's method to the letter: LOF over samples
+            with 20 neighbours removes 0.2 %, then hull, slices, ellipses. "hull" differs in one step: it
+            judges whole encounters and removes as many as are outliers. Both zones shrink as the data grows.
+            None: "respect" if, within r_max, the data holds 150 encounters and the null model twice as many,
+            and they show respect, else "paper", which describes where hardly anybody was.
         r_max : distance within which people count [m].
         speeds : speeds of the zones [m/s].
-        null : the null model, from `szlib.null_encounters`. "respect" needs it; with any method, the data is
-            tested against it (`null_test`).
+        null : the null model, from `szlib.null_pairs` for pairs, or `szlib.null_encounters` for lone
+            encounters. "respect" needs it; with any method, the data is tested against it (`null_test`).
         n_resamples : number of zones estimated again, or drawn from the posterior, for the intervals; 0: no
             intervals.
         seed : of the resampling.
-        options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05), used
-            with None too where the quantile is taken. "hull": `fraction` and `n_neighbours` as
-            in `szlib.remove_outliers`. "paper", "respect": none.
+        options : options of the method. "hull": `fraction` and `n_neighbours` as in `szlib.remove_outliers`.
+            "paper", "respect": none.
 
         Raises
         ------
@@ -207,7 +256,7 @@ class SocialZone:
         >>> zone.method, list(zone.ellipses)
         ('paper', [1.1])
         """
-        _check_method(method or "quantile", options)
+        _check_method(method or "paper", options)
         check_columns(samples, ["los_angle", "distance", "speed"])
         fitted_speeds = sorted({float(speed) for speed in speeds})
         if not fitted_speeds:
@@ -217,7 +266,7 @@ class SocialZone:
             better = RespectEstimator.where_better(
                 samples, fitted_speeds, r_max=r_max, null=null
             )
-        method = method or ("quantile" if better is None else "respect")
+        method = method or ("paper" if better is None else "respect")
         if method == "respect":
             options = {"null": null}
         build = partial(METHODS[method][0], r_max=r_max, **options)
@@ -288,15 +337,22 @@ class SocialZone:
         return zone
 
     @property
+    def meaning(self) -> str:
+        """What the zone is, and what its intervals are of, in one line."""
+        if self.method == "respect":
+            return "respect: the zone that people keep; it lies in the intervals with a probability of 95 %"
+        return (
+            f"{self.method}: where (nearly) nobody was; the 95 % intervals are of that, not of the zone that "
+            "people keep"
+        )
+
+    @property
     def speed_range(self) -> tuple[float, float]:
         """Lowest and highest speed of the shape [m/s]."""
         return self.shape.speed_range
 
     def boundary(self, speed: float, n: int = 361) -> Array:
-        """Boundary of the zone at a `speed` [m/s]: `n` points in the person's frame, shape (n, 2) [m].
-
-        The boundary of a `PolarZone` is linear between directions and fitted speeds, and NaN without data.
-        """
+        """Boundary of the zone at a `speed` [m/s]: `n` points in the person's frame, shape (n, 2) [m]."""
         return self.shape.boundary(speed, np.linspace(-np.pi, np.pi, n))
 
     def ellipse(self, speed: float) -> Ellipse:
@@ -333,7 +389,7 @@ class SocialZone:
         >>> zone.verdict(1.1)
         'undecided'
         >>> zone.verdict(1.1).reasons[0]
-        'no null model: fit the zone with null=szlib.null_encounters(tracks)'
+        'no null model: fit the zone with SocialZone.from_tracks(tracks)'
         """
         return judge(self, float(speed))
 
@@ -460,7 +516,6 @@ def _write(zone: SocialZone, path: Path) -> None:
             {"speed": v, "verdict": each, "reasons": each.reasons}
             for v, each in ((v, zone.verdict(v)) for v in zone.ellipses)
         ],
-        "radii": shape if isinstance(shape, PolarZone) else None,
         "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
     }
     try:
@@ -499,6 +554,10 @@ def _read_content(path: Path) -> dict[str, Any]:
 def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
     r_max, side_counts = float(content["r_max"]), content["side_counts"]
+    ellipses = {
+        float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"])
+        for e in content["ellipses"]
+    }
     uncertainty, null_test = content["uncertainty"], content["null_test"]
     if uncertainty is not None:
         tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands")}
@@ -515,18 +574,10 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         null_test = NullTest(**null_test)
     return {
         "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
-        if content["radii"] is None
-        else PolarZone(
-            **{
-                name: np.array(values, float)
-                for name, values in content["radii"].items()
-            }
-        ),
+        if content["hull_vertices"] is not None
+        else EllipseZone(ellipses),
         "r_max": r_max,
-        "ellipses": {
-            float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"])
-            for e in content["ellipses"]
-        },
+        "ellipses": ellipses,
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
@@ -551,9 +602,7 @@ def _to_json(value: Any) -> Any:
     """JSON values of a table, array or group of fields; NaN is null and infinity "Infinity"."""
     if isinstance(value, pd.DataFrame):
         return {name: column.to_numpy() for name, column in value.items()}
-    if isinstance(
-        value, Uncertainty | NullTest | RespectRadius | SensorCheck | PolarZone
-    ):
+    if isinstance(value, Uncertainty | NullTest | RespectRadius | SensorCheck):
         return vars(value)
     if isinstance(value, np.generic):
         return value.item()

@@ -35,15 +35,16 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from ..core.checks import Array, require
+from .ellipses import DIRECTIONS, ellipse_reach
 from .estimators import Estimator
 from .outliers import encounter_numbers, pair_numbers
-from .polar import DIRECTIONS, ellipse_reach
-from .quantile import SPEED_BAND
 
 # Sides of the reference pedestrian, 45 deg each.
 SIDES = (
     "ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right"
 )  # fmt: skip
+# Encounters of reference pedestrians up to this much slower or faster are pooled [m/s] (assumed).
+SPEED_BAND = 0.2
 MIN_ENCOUNTERS = 20  # encounters needed on each side: a share of 5 % of fewer is less than one (assumed)
 MIN_DAYS = 10  # number of days from which on whole days are resampled instead of pairs of people (assumed)
 LEVEL = 0.95  # share of data sets whose interval contains the limit

@@ -15,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 
 USABLE, UNDECIDED, NO_RESPECT = "usable", "undecided", "no respect shown"
-# Encounters that a description needs (quantile, hull): on real people the intervals of fewer hold the
+# Encounters that a description needs (paper, hull): on real people the intervals of fewer hold the
 # truth too rarely (measured).
 MIN_TOTAL = 600
 # Largest share of careless people, unless the method states its own: then most people keep the zone.
@@ -103,7 +103,7 @@ def _null_model(zone: FittedZone) -> Iterator[str]:
     """What is missing in the comparison with people who ignore each other."""
     test = zone.null_test
     if test is None:
-        yield "no null model: fit the zone with null=szlib.null_encounters(tracks)"
+        yield "no null model: fit the zone with SocialZone.from_tracks(tracks)"
         return
     if not test.is_significant:
         yield f"{test}, and {MIN_TESTED} encounters within {zone.r_max:g} m are needed to tell"

@@ -153,7 +153,6 @@ CASES: dict[str, Callable[[], dict[str, float]]] = {
     "growth: encounters": alone(bench_encounters),
     "growth: null shifts": alone(bench_null),
     "growth: hull": alone(bench_fit, "hull"),
-    "growth: quantile": alone(bench_fit, "quantile"),
     "growth: respect": alone(bench_respect),
     "growth: LOF": alone(bench_lof),
 }

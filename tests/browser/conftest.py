@@ -38,9 +38,9 @@ SETTINGS = {
 """Show every cell on the page, and ask nothing of other servers."""
 ELLIPSE = "szlib.Ellipse((0.05, 0.0), (0.97, 0.75))"
 GIVEN = {
-    "05_zones": f"""from szlib.zones.polar import DIRECTIONS, PolarZone
-shape = PolarZone([0.7, 1.5], DIRECTIONS, [np.full(72, 0.9), np.full(72, 1.2)])
-zone = szlib.SocialZone(shape, 2.0, {{1.1: {ELLIPSE}}})""",
+    "05_zones": f"""from szlib.zones.ellipses import EllipseZone
+shape = EllipseZone({{v: {ELLIPSE}.scaled(v) for v in (0.7, 1.1, 1.5)}})
+zone = szlib.SocialZone(shape, 2.0, shape.ellipses)""",
     "10_corridor": f"""settings, scenario = szlib.MPCSettings(), szlib.SCENARIOS["corridor"]
 zone = {ELLIPSE}
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)

@@ -10,7 +10,7 @@ from studies.distances import euclidean_to_ellipse
 
 import szlib
 from szlib.control.differential_drive import Unicycle
-from szlib.zones.polar import DIRECTIONS, PolarZone
+from szlib.zones.ellipses import EllipseZone
 
 ZONE = szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)
 GOAL = (5.0, 0.5)
@@ -47,8 +47,8 @@ def make_with_tf(monkeypatch, tmp_path):
 
 def maker(monkeypatch, tmp_path, module_name, tf=False):
     """How to make a node."""
-    shape = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
-    szlib.SocialZone(shape, 2.0, {1.1: ZONE}).save(tmp_path / "zone.json")
+    shape = EllipseZone({1.1: ZONE})
+    szlib.SocialZone(shape, 2.0, shape.ellipses).save(tmp_path / "zone.json")
     with ros.node_module(module_name, tf) as module:
 
         def node(**parameters):

@@ -125,7 +125,7 @@ INTERNALS = [
     ),
     (
         "my_zone",
-        "import szlib\ndef my_zone(samples, speed):\n    return szlib.SocialZone.fit(samples, method='quantile').ellipse(speed)\n",
+        "import szlib\ndef my_zone(samples, speed):\n    return szlib.SocialZone.fit(samples, method='paper').ellipse(speed)\n",
     ),
     (
         "my_zone",

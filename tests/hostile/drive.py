@@ -31,7 +31,7 @@ from helpers.ros_stubs import Node, goal, hear, odometry, people, tick
 from tqdm import tqdm
 
 import szlib
-from szlib.zones.polar import DIRECTIONS, PolarZone
+from szlib.zones.ellipses import EllipseZone
 
 STEPS = {False: 300, True: 50_000}
 TICKS = {False: 400, True: 50_000}
@@ -166,10 +166,8 @@ def attack_node(count: int, tally: Counter[str], seed: int = 0) -> None:
     ):
         warnings.simplefilter("ignore", szlib.DataWarning)  # a zone of nobody's data
         zone = Path(folder) / "zone.json"
-        shape = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
-        szlib.SocialZone(
-            shape, 2.0, {1.1: szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)}
-        ).save(zone)
+        shape = EllipseZone({1.1: szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)})
+        szlib.SocialZone(shape, 2.0, shape.ellipses).save(zone)
         for k in tqdm(range(count // A_SETTING), desc="nodes", leave=False):
             rng = np.random.default_rng([seed, k, 3])
             Node.given = {

@@ -6,8 +6,7 @@ import shapely
 from costmaps import FADE, Grid, draw_costmap
 
 import szlib
-from szlib.zones.ellipses import BODY_RADIUS, circle_around
-from szlib.zones.polar import DIRECTIONS, PolarZone
+from szlib.zones.ellipses import BODY_RADIUS, EllipseZone, circle_around
 
 ZONE = szlib.Ellipse((0.2, -0.1), (1.0, 0.6), 0.4)
 GRID = Grid((-4.0, -3.0), 0.1, (60, 80))
@@ -121,8 +120,8 @@ def test_person_zone_replaces_the_common_zone_and_social_zone_depends_on_speed()
     own = szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
     drawn = draw_costmap(ZONE, [szlib.Person((0.0, 0.0), (1.0, 0.0), zone=own)], GRID)
     assert np.array_equal(drawn, draw_costmap(own, [[0.0, 0.0, 1.0, 0.0]], GRID))
-    shape = PolarZone(np.array([0.5, 1.1]), DIRECTIONS, np.ones((2, len(DIRECTIONS))))
-    zone = szlib.SocialZone(shape, 2.0, {0.5: own, 1.1: ZONE})
+    shape = EllipseZone({0.5: own, 1.1: ZONE})
+    zone = szlib.SocialZone(shape, 2.0, shape.ellipses)
     people = [[0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 0.0]]
     with pytest.warns(
         szlib.DataWarning, match="quality of the zone is unknown"

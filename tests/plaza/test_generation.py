@@ -22,7 +22,7 @@ from szlib.plaza.settings import (
     PlazaSettings,
 )
 from szlib.tracks.clock import nearest_tick, to_clock
-from szlib.zones.polar import ellipse_reach
+from szlib.zones.ellipses import ellipse_reach
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
 DEFAULT, POLITE = PlazaSettings(), PlazaSettings(intruders=0.0)

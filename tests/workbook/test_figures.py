@@ -12,6 +12,7 @@ import pandas as pd
 import plots
 import pytest
 from PIL import Image
+from studies import quantile_zone
 from studies.pooling import pool
 from studies.safety_claims import MOTION_CHANGES
 
@@ -252,7 +253,7 @@ def fit_few(samples):
     with pytest.warns(szlib.DataWarning, match="fewer than 20"):
         return szlib.SocialZone.fit(
             samples[samples["encounter"] < 15],
-            method="quantile",
+            method=quantile_zone.NAME,
             speeds=(0.9, 1.1),
             n_resamples=20,
         )
@@ -266,7 +267,7 @@ def test_only_a_usable_zone_is_solid(zone, samples, monkeypatch):
         lambda self, speed: "usable" if self is usable else "undecided",
     )
     for known, line in ((usable, "-"), (fit_few(samples), "--")):
-        ellipse = figures.plot_zone(known, 1.1).lines[known.method != "hull"]
+        ellipse = figures.plot_zone(known, 1.1).lines[0]
         assert ellipse.get_linestyle() == line
         ax = figures.plot_zones(known)
         assert [each.get_linestyle() for each in ax.lines[:2]] == [line] * 2
@@ -285,15 +286,15 @@ def test_the_band_is_drawn_exactly_where_an_interval_is_known(zone, samples):
     assert "interval" not in figures.plot_zones(plain).get_title()
 
 
-def test_a_quantile_zone_shows_its_radii_and_has_no_hull(samples):
+def test_a_fitted_zone_has_no_hull(samples):
     zone = szlib.SocialZone.fit(
-        samples, method="quantile", speeds=(1.1,), n_resamples=0
+        samples, method=quantile_zone.NAME, speeds=(1.1,), n_resamples=0
     )
     labels = [
         text.get_text()
         for text in figures.plot_zone(zone, 1.1).get_legend().get_texts()
     ]
-    assert labels == ["radius by direction (quantile)", "fitted ellipse"]
+    assert labels == ["fitted ellipse"]
     with pytest.raises(szlib.ZoneError, match="'quantile' has no hull to draw"):
         plots.plot_hull(zone)
 

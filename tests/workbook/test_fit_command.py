@@ -40,10 +40,8 @@ def test_zone_from_tracks_is_that_of_the_library(
     assert fit(recording, "--out", out) == 0
     printed, zone = capsys.readouterr().out, szlib.SocialZone.load(out)
     tracks = szlib.read_tracks(recording)
-    null = szlib.null_encounters(tracks, shifts=3, progress=False)
-    expected = szlib.SocialZone.fit(
-        szlib.find_encounters(tracks), null=null, n_resamples=20
-    )
+    expected = szlib.SocialZone.from_tracks(tracks)
+    assert printed.startswith("method respect: the zone that people keep; it lies in")
     assert zone.ellipses == expected.ellipses
     assert zone.null_test == expected.null_test and zone.null_test is not None
     assert printed.splitlines()[-1] == f"zone at 1.1 m/s: {zone.verdict(1.1).sentence}"
@@ -75,7 +73,7 @@ def test_columns_of_other_names_and_units_are_read(
         "--area",
         *map(float, str(szlib.ATC_SQUARE).split()),
     ]
-    assert fit(tmp_path / "hall.csv", "--out", out, "--method", "quantile", *given) == 0
+    assert fit(tmp_path / "hall.csv", "--out", out, "--method", "paper", *given) == 0
     zone, expected = (
         szlib.SocialZone.load(out),
         szlib.find_encounters(szlib.read_tracks(recording)),
@@ -87,11 +85,11 @@ def test_extracted_days_have_no_null_model_until_their_tracks_are_given(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     days, out = recording.with_name("days"), tmp_path / "zone.json"
-    assert fit(days, "--out", out, "--method", "quantile") == 0
+    assert fit(days, "--out", out, "--method", "paper") == 0
     assert szlib.SocialZone.load(out).null_test is None
     printed = capsys.readouterr().out
     assert "no null model: extracted days hold no tracks; add --tracks FILE" in printed
-    assert fit(days, "--out", out, "--method", "quantile", "--tracks", recording) == 0
+    assert fit(days, "--out", out, "--method", "paper", "--tracks", recording) == 0
     zone = szlib.SocialZone.load(out)
     assert zone.null_test is not None and zone.null_test.n_shifts == 3
     assert "no null model" not in capsys.readouterr().out
@@ -194,6 +192,11 @@ def test_too_few_encounters_are_said_with_what_is_missing(
         tmp_path / "few.csv", settings=szlib.PlazaSettings(n_encounters=1)
     )
     assert fit(day, "--out", tmp_path / "zone.json") == 2
+    assert (
+        "no two people, of the kinds compared, came within 2 m"
+        in capsys.readouterr().err
+    )
+    assert fit(day, "--out", tmp_path / "zone.json", "--method", "paper") == 2
     assert "encounters were found, 600 are needed" in capsys.readouterr().err
     assert not (tmp_path / "zone.json").exists()
 

@@ -19,7 +19,7 @@ from szlib.workbook.record import (
     notebook_record,
     parameters,
 )
-from szlib.zones.polar import PolarZone
+from szlib.zones.ellipses import EllipseZone
 
 
 @pytest.fixture
@@ -98,7 +98,7 @@ def test_checks_that_assume_the_zone_of_the_plaza_observe_other_data(record):
 def test_method_parameters_change_encounters_and_zone(record, monkeypatch):
     searched, fitted = [], []
     found = pd.DataFrame({"encounter": [0], "distance": [1.0]})
-    shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
+    shape = EllipseZone({1.3: szlib.Ellipse((0, 0), (1, 1))})
     zone = szlib.SocialZone(shape, 1.5, {1.3: szlib.Ellipse((0, 0), (1, 1))})
     monkeypatch.setattr(
         data_cache, "find_encounters", lambda *_, **k: searched.append(k) or found
@@ -114,14 +114,14 @@ def test_method_parameters_change_encounters_and_zone(record, monkeypatch):
     NotebookRecord("02_test", given).cache.zone()
     turned = NotebookRecord(
         "02_test",
-        given | {"min_speed": 0.6, "space_length": 4.0, "r_max": 1.5, "q": 0.1},
+        given | {"min_speed": 0.6, "space_length": 4.0, "r_max": 1.5},
     )
     turned = replace(turned.cache, folder=record.out)
     turned.zone()
     turned.zone()
     assert [each["settings"].min_speed for each in searched] == [0.4, 0.6]
     assert searched[1]["settings"].space == szlib.AttentionalSpace(length=4.0)
-    assert [(each["r_max"], each["q"]) for each in fitted] == [(2.0, 0.05), (1.5, 0.1)]
+    assert [each["r_max"] for each in fitted] == [2.0, 1.5]
     assert (
         NotebookRecord("02_test", given | {"zone_speed": 1.3}).cache.method.zone_speed
         == 1.3
@@ -191,7 +191,7 @@ def test_notebook_of_a_run_uses_the_data_with_which_the_run_began(record, monkey
 
 
 def test_zone_of_other_data_is_not_loaded_if_it_replaces_the_file(record, monkeypatch):
-    shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
+    shape = EllipseZone({1.3: szlib.Ellipse((0, 0), (1, 1))})
     zone = szlib.SocialZone(shape, 2.0, {1.3: szlib.Ellipse((0, 0), (1, 1))})
     monkeypatch.setattr(
         DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []})

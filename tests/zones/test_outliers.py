@@ -20,6 +20,7 @@ from szlib.zones.outliers import (
     NEIGHBOUR_SHARE,
     OUTLIER_FACTOR,
     complementary_points,
+    encounter_numbers,
     is_outlier,
     local_outlier_factors,
     nearest_approaches,
@@ -473,3 +474,16 @@ def test_fixed_share_is_removed_from_the_real_day(real_samples: pd.DataFrame) ->
     kept = remove_outliers(real_samples, fraction=FRACTION)
     *_, near, inliers = funnels.get(kept)
     assert inliers["rejected"]["outlier (LOF)"] == math.ceil(0.002 * (near["kept"] - 1))
+
+
+def test_encounters_are_numbered_in_order_of_appearance() -> None:
+    table = pd.DataFrame({"encounter": [5, 5, 2, 5], "day": ["a", "a", "a", "b"]})
+    number, first = encounter_numbers(table)
+    assert number.tolist() == [0, 0, 1, 2]
+    assert first.index.tolist() == [0, 2, 3]
+    assert encounter_numbers(table.drop(columns="encounter"))[0].tolist() == [
+        0,
+        1,
+        2,
+        3,
+    ]

@@ -290,6 +290,24 @@ def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> No
     )
 
 
+@pytest.mark.parametrize("across", [-0.02, 0.02])
+def test_the_intervals_of_a_round_zone_are_not_those_of_its_longer_and_shorter_axis(
+    estimator: RespectEstimator, across: float
+) -> None:
+    """Whichever axis is longer in a draw, the semi-axes of a circle are alike."""
+    rng, best = np.random.default_rng(0), np.zeros(12)
+    best[[3, 5]] = np.log(0.8), np.log(0.8) + across
+    draws = np.tile(best, (4000, 1))
+    draws[:, [3, 5]] = np.log(0.8) + rng.normal(0, 0.05, (4000, 2))
+    round_one = replace(estimator)
+    drawn = replace(estimator.draws, values=draws)
+    round_one.__dict__.update(best=best, draws=drawn)
+    a, b, angle = round_one.posterior([1.1])[:, 0, 2:].T
+    assert (a.mean(), b.mean()) == pytest.approx((0.8, 0.8), abs=0.005)
+    assert (a < b).mean() == pytest.approx(0.5, abs=0.05)
+    assert np.abs(np.sin(angle)) == pytest.approx(float(across > 0))
+
+
 def test_the_posterior_is_never_surer_than_the_model_is_right(
     estimator: RespectEstimator,
 ) -> None:
@@ -314,7 +332,7 @@ def test_the_posterior_is_never_surer_than_the_model_is_right(
 
 
 @pytest.mark.filterwarnings("ignore:at 1.1 m/s fewer than 20")
-def test_the_default_is_the_quantile_where_the_null_model_is_small_or_shows_no_respect(
+def test_the_default_is_the_paper_s_where_the_null_model_is_small_or_shows_no_respect(
     data: pd.DataFrame, null: szlib.NullEncounters
 ) -> None:
     def method(samples: pd.DataFrame, model: szlib.NullEncounters | None) -> str:
@@ -322,14 +340,13 @@ def test_the_default_is_the_quantile_where_the_null_model_is_small_or_shows_no_r
             samples, null=model, speeds=(1.1,), n_resamples=0
         ).method
 
-    assert method(data, None) == "quantile"
+    assert method(data, None) == "paper"
     assert (
-        method(data, null_of(null.samples[null.samples["encounter"] < 1500]))
-        == "quantile"
+        method(data, null_of(null.samples[null.samples["encounter"] < 1500])) == "paper"
     )
-    assert method(passing_pairs(300, 60), null) == "quantile"
-    assert method(data.drop(columns="other_speed"), null) == "quantile"
-    assert method(data[data["encounter"] < 200], null) == "quantile"
+    assert method(passing_pairs(300, 60), null) == "paper"
+    assert method(data.drop(columns="other_speed"), null) == "paper"
+    assert method(data[data["encounter"] < 200], null) == "paper"
 
 
 def test_a_zone_that_does_not_contain_its_person_is_no_default(
@@ -344,7 +361,7 @@ def test_a_zone_that_does_not_contain_its_person_is_no_default(
         )
     assert (
         szlib.SocialZone.fit(data, null=null, speeds=(1.1,), n_resamples=0).method
-        == "quantile"
+        == "paper"
     )
 
 

@@ -45,19 +45,23 @@ def test_one_seed_gives_the_same_draws_and_another_seed_others() -> None:
 
 
 def test_skewed_densities_in_many_dimensions_are_drawn() -> None:
-    """Twelve gamma densities of the logarithm: their quantiles are known."""
-    shape = np.linspace(0.7, 6, 12)
-    found = sample(
-        lambda p: float((shape * p - np.exp(p)).sum()), np.log(shape),
-        np.full(12, -30.0), np.full(12, 9.0), np.random.default_rng(3),
-        spread=np.full(12, 0.01), n_reported=12,
-    )  # fmt: skip
-    assert found.has_converged
-    quantiles = np.array([0.1, 0.5, 0.9])[:, None]
-    share = stats.gamma(shape).cdf(
-        np.exp(np.quantile(found.values, quantiles.ravel(), axis=0))
-    )
-    assert share == pytest.approx(np.broadcast_to(quantiles, share.shape), abs=0.05)
+    """Twelve gamma densities of the logarithm: their quantiles are known.
+
+    500 effective draws leave a standard error of 0.022 in a share, four samples of them 0.011.
+    """
+    shape, quantiles = np.linspace(0.7, 6, 12), np.array([0.1, 0.5, 0.9])[:, None]
+    shares = []
+    for seed in range(4):
+        found = sample(
+            lambda p: float((shape * p - np.exp(p)).sum()), np.log(shape),
+            np.full(12, -30.0), np.full(12, 9.0), np.random.default_rng(seed),
+            spread=np.full(12, 0.01), n_reported=12,
+        )  # fmt: skip
+        assert found.has_converged
+        at = np.exp(np.quantile(found.values, quantiles.ravel(), axis=0))
+        shares.append(stats.gamma(shape).cdf(at))
+    expected = np.broadcast_to(quantiles, shares[0].shape)
+    assert np.mean(shares, axis=0) == pytest.approx(expected, abs=0.05)
 
 
 def test_two_narrow_peaks_are_both_drawn_or_not_converged() -> None:

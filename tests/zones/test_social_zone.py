@@ -355,7 +355,7 @@ def test_saved_zone_loads_bit_by_bit(
 def test_file_states_format_version_and_units(zone: SocialZone, tmp_path: Path) -> None:
     zone.save(str(tmp_path / "zone.json"))
     content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
-    assert (content["format"], content["version"]) == ("szlib.SocialZone", 4)
+    assert (content["format"], content["version"]) == ("szlib.SocialZone", 5)
     assert "m, s, rad" in content["units"]
     assert content["provenance"]["szlib"] == szlib.__version__
 
@@ -408,7 +408,7 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
     "a list": (lambda _: "[1, 2]", "is JSON but no zone"),
     "null": (lambda _: "null", "is JSON but no zone"),
     "other JSON": (lambda _: '{"type": "FeatureCollection"}', "is JSON but no zone"),
-    "newer": (broken(lambda c: c.update(version=5)), r"version 5, .* reads 4; install the szlib"),
+    "newer": (broken(lambda c: c.update(version=6)), r"version 6, .* reads 5; install the szlib"),
     "older": (broken(lambda c: c.update(version=1)), "has format version 1, .* fit the zone again"),
     "no version": (broken(lambda c: c.pop("version") and None), "has format version None"),
     "no r_max": (broken(lambda c: c.pop("r_max") and None), CHECKSUM),
@@ -423,7 +423,7 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
     "a ragged hull": (broken(lambda c: c.update(hull_vertices=[[0, 0, 0], [1]])), CHECKSUM),
     "no hull": (broken(lambda c: c.update(hull_vertices=None)), CHECKSUM),
     "an unknown method": (broken(lambda c: c.update(method="guess")), CHECKSUM),
-    "a method without its radii": (broken(lambda c: c.update(method="quantile")), CHECKSUM),
+    "a method of another shape": (broken(lambda c: c.update(method="respect")), CHECKSUM),
     "counts without sides": (broken(lambda c: c["side_counts"].pop("behind") and None), CHECKSUM),
     "ragged counts": (broken(lambda c: c["side_counts"]["left"].pop() and None), CHECKSUM),
     "no interval": (broken(lambda c: c["uncertainty"].pop("intervals") and None), CHECKSUM),
@@ -466,7 +466,7 @@ def test_invalid_r_max_is_refused(zone: SocialZone, r_max: float) -> None:
 # --- three ways, one object ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["hull", "quantile"])
+@pytest.mark.parametrize("method", ["hull", "paper"])
 def test_every_method_finds_the_known_zone(samples: pd.DataFrame, method: str) -> None:
     """One person in thirty is within 6 cm of the rim: so near are both ways to it."""
     zone = fit(
@@ -483,7 +483,7 @@ def test_every_method_finds_the_known_zone(samples: pd.DataFrame, method: str) -
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["hull", "quantile"])
+@pytest.mark.parametrize("method", ["hull", "paper"])
 def test_zone_of_every_method_drives_the_robot_and_reloads(
     samples: pd.DataFrame, method: str, tmp_path: Path
 ) -> None:
@@ -524,11 +524,10 @@ def test_intervals_do_not_change_the_zone(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "guess"}, "method must be one of quantile, paper, hull, respect; got 'guess'"),
-        ({"q": 0.05}, "method 'hull' has no option 'q'; 'quantile' has q; 'paper' has none; 'hull' has"),
-        ({"method": "quantile", "n_neighbours": 200}, "has no option 'n_neighbours'; .*'hull' has"),
+        ({"method": "guess"}, "method must be one of paper, hull, respect.*; got 'guess'"),
+        ({"q": 0.05}, "method 'hull' has no option 'q'; 'paper' has none; 'hull' has"),
+        ({"method": "respect", "n_neighbours": 200}, "has no option 'n_neighbours'; .*'hull' has"),
         ({"outlier_share": 0.1}, "method 'hull' has no option 'outlier_share'"),
-        ({"method": "quantile", "q": 0.0}, "q must be a share of encounters, 0 < q < 1; got 0"),
         ({"n_resamples": 1}, "resamples must be a whole number, 0 .no intervals. or at least 2; got 1"),
     ],
 )  # fmt: skip
@@ -537,16 +536,6 @@ def test_invalid_options_are_refused(
 ) -> None:
     with pytest.raises(szlib.SzlibError, match=message):
         fit(samples, **options)
-
-
-def test_quantile_zone_is_undefined_outside_its_speeds(samples: pd.DataFrame) -> None:
-    zone = fit(samples, method="quantile", speeds=(0.9, 1.1))
-    assert zone.speed_range == (0.9, 1.1)
-    with pytest.raises(
-        szlib.ZoneError,
-        match=r"at 1\.2 m/s is undefined: it was fitted for 0\.9 to 1\.1 m/s",
-    ):
-        zone.ellipse(1.2)
 
 
 def made_null(n: int = 3000, *, r_max: float = 2.0) -> szlib.NullEncounters:
@@ -578,9 +567,7 @@ def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
 
 
 def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
-    zone = fit(
-        wanderers(300, seed=5), method="quantile", speeds=(1.1,), null=made_null()
-    )
+    zone = fit(wanderers(300, seed=5), method="hull", speeds=(1.1,), null=made_null())
     assert zone.null_test.p_value > 0.05
     assert fit(samples).null_test is None
 
@@ -606,7 +593,7 @@ def test_respect_without_valid_null_is_refused(options: dict, message: str) -> N
 @pytest.mark.filterwarnings("ignore:6 encounters are too few to find outliers")
 def test_low_sample_zone_warns(samples: pd.DataFrame, tmp_path: Path) -> None:
     six = samples[samples["encounter"] < 6]
-    for method in ("hull", "quantile"):
+    for method in ("hull", "paper"):
         with pytest.warns(
             szlib.DataWarning,
             match=r"at 1\.1 m/s fewer than 20 encounters were seen ahead \(",
@@ -655,9 +642,9 @@ def test_speed_without_encounters_is_not_adequate(zone: SocialZone) -> None:
         (lambda c: c.update(r_max=math.nan), "r_max"),
         (lambda c: c.update(hull_vertices=[[0, 0, 0]] * 9), "lie in one plane"),
         (lambda c: c.update(hull_vertices=[[0, 0, 0], [1]]), "is damaged"),
-        (lambda c: c.update(hull_vertices=None), "points must have shape"),
-        (lambda c: c.update(method="guess"), "one of quantile, paper, hull"),
-        (lambda c: c.update(method="quantile"), "HullZone is not the shape"),
+        (lambda c: c.update(hull_vertices=None), "EllipseZone is not the shape"),
+        (lambda c: c.update(method="guess"), "one of paper, hull"),
+        (lambda c: c.update(method="respect"), "HullZone is not the shape"),
         (lambda c: c.update(provenance=3), "is damaged"),
     ],
 )

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from helpers.passers import passers
 from scipy.stats import norm
+from studies.quantile_zone import QuantileEstimator
 
 import szlib
 from szlib.zones.estimators import Estimator, ZoneShape
-from szlib.zones.quantile import QuantileEstimator
 from szlib.zones.uncertainty import (
     _MAX_FAILED,
     MIN_DAYS,

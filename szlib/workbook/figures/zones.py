@@ -57,18 +57,12 @@ def plot_zone(
     'Minimum social zone at 1.1 m/s: undecided'
     """
     ax = get_axes(ax, size=(5, 4.5))
-    boundary, verdict = zone.boundary(speed), zone.verdict(speed)
+    verdict = zone.verdict(speed)
     ellipse = zone.ellipses.get(speed) or zone.shape.ellipse(speed)
     is_hull = zone.method in ("hull", "paper")
     if is_hull:
-        ax.fill(*boundary.T, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
-    else:
-        ax.plot(
-            *boundary.T,
-            color=GREY,
-            linewidth=1.5,
-            label=f"radius by direction ({zone.method})",
-        )
+        boundary = zone.boundary(speed).T
+        ax.fill(*boundary, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
     name = "smallest enclosing ellipse" if is_hull else "fitted ellipse"
     line = "-" if verdict == "usable" else "--"
     ax.plot(*ellipse.curve().T, line, color=BLUE, linewidth=2, label=name)

@@ -150,7 +150,7 @@ class DataCache:
         return samples
 
     def zone(self) -> SocialZone:
-        """The zone that notebook 05 stored, or the same fitted now."""
+        """The zone that notebook 06 stored, or the same fitted now."""
         file, source = self._path("zone.json"), self._zone_source()
         zone = read_stored_zone(file) if load_cached(file, source) else None
         if zone and zone.provenance.get("source") == json.loads(json.dumps(source)):
@@ -158,12 +158,18 @@ class DataCache:
         return self.fit_zone()
 
     def fit_zone(self) -> SocialZone:
-        """Fit the zone, test it against the null model, and store it for later notebooks."""
-        return self.store_zone(
-            SocialZone.fit(
-                self.encounters(), null=self.null_model(), **self.method.fit_options()
-            )
-        )
+        """Fit the zone to every pair of people, and store it for later notebooks.
+
+        Where a recording is too short for a null model, it is the paper's zone, of lone encounters.
+        """
+        tracks, settings = self._searched()
+        options = self.method.fit_options()
+        try:
+            zone = SocialZone.from_tracks(tracks, area=settings.area, **options)
+        except DataError as error:
+            print(f"The zone is not tested against a null model: {error}")
+            zone = SocialZone.fit(self.encounters(), method="paper", **options)
+        return self.store_zone(zone)
 
     def null_model(self, few_shifts: int = FEW_SHIFTS) -> NullEncounters | None:
         """The null model of the data; None, and a message, where the data is too short for one.

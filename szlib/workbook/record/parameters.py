@@ -20,7 +20,6 @@ from ...core.input_files import printable
 from ...encounters.areas import AUTO
 from ...encounters.geometry import PAPER_SPACE
 from ...zones.outliers import R_MAX
-from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
 from ..folders import OPTIONS, read_defaults
 
@@ -50,7 +49,6 @@ class ZoneMethod:
     reading : how the files of the data are read: options of `szlib.Recipe` by name (notebook 01).
     has_walls : whether the outline of the area is a wall, beyond which the space may reach (notebook 02).
     r_max : distance up to which samples count [m] (notebook 03).
-    q : fraction of encounters that may enter the quantile zone (notebook 05).
     zone_speed : walking speed whose zone the robot keeps out of [m/s] (notebook 05).
 
     Examples
@@ -67,7 +65,6 @@ class ZoneMethod:
     min_speed: float = EncounterSettings.min_speed
     has_walls: bool = EncounterSettings.has_walls
     r_max: float = R_MAX
-    q: float = QUANTILE
     zone_speed: float = MPCSettings.zone_speed
     reading: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
@@ -99,7 +96,6 @@ class ZoneMethod:
         """Keywords of `szlib.SocialZone.fit`."""
         return {
             "r_max": self.r_max,
-            "q": self.q,
             "speeds": sorted({*SPEEDS, self.zone_speed}),
         }
 

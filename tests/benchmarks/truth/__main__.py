@@ -5,6 +5,7 @@
     python tests/benchmarks/truth none groups --lone             by the paper's lone encounters
     python tests/benchmarks/truth zone .8 .5                     crowds that swerve around such an ellipse
     python tests/benchmarks/truth zone .8 .8 --orca              crowds that keep a circle by ORCA
+    python tests/benchmarks/truth plaza --crowds 40              default plazas of several seeds
 
 `none` takes names of crowds and trackers. Each crowd is printed as it comes, then the counts. `--out FILE`
 adds the crowds to a table.
@@ -18,6 +19,7 @@ import warnings
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -27,7 +29,6 @@ from crowds import AREA, CROWDS, TRACKERS, as_table, orca, read, singles, swervi
 import szlib
 
 SPEED = 1.1  # of the zone [m/s]
-SECONDS = 1800.0  # of a recording
 SHIFTS = 99
 SHORT = ("singles", "groups", "merging", "turnstiles")
 
@@ -39,7 +40,7 @@ def judge_crowds(
     for name in names:
         for seed in range(asked.first, asked.first + asked.crowds):
             rng = np.random.default_rng([seed, *name.encode()])
-            rows = as_table(CROWDS.get(name, singles)(rng, asked.people, SECONDS))
+            rows = as_table(CROWDS.get(name, singles)(rng, asked.people, asked.seconds))
             seen = TRACKERS[name](rows, rng) if name in TRACKERS else rows
             row = judge(
                 read(seen, rng, rate=asked.rate, noise=asked.noise), lone=asked.lone
@@ -57,7 +58,7 @@ def judge_zones(
         truth["radius"] = a
     for seed in range(asked.first, asked.first + asked.crowds):
         rng = np.random.default_rng([seed, 0])
-        walks = singles(rng, asked.people, SECONDS)
+        walks = singles(rng, asked.people, asked.seconds)
         if asked.orca:
             orca(walks, a)
         else:
@@ -65,21 +66,47 @@ def judge_zones(
         tracks = read(as_table(walks), rng, rate=asked.rate, noise=asked.noise)
         name = f"{'ORCA' if asked.orca else 'zone'} {a:g} x {b:g}"
         row = {"crowd": name, "seed": seed} | judge(tracks, lone=asked.lone)
-        for name, value in truth.items():
-            low, high = (row.get(f"{name}_{end}", np.nan) for end in ("low", "high"))
-            row[f"holds_{name}"] = low <= value <= high
-        yield row
+        yield row | says_truth(row, truth)
 
 
-def judge(tracks: pd.DataFrame, *, lone: bool) -> dict[str, Any]:
+def judge_plazas(_: list[str], asked: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Judge default plazas, by the zone that `szlib fit` gives."""
+    settings = szlib.PlazaSettings()
+    zone = settings.true_zone(SPEED)
+    a, b = zone.semi_axes
+    truth = {"a": a, "b": b, "area": zone.area, "center_x": zone.center[0]}
+    for seed in range(asked.first, asked.first + asked.crowds):
+        with TemporaryDirectory() as folder:
+            path = szlib.make_plaza(Path(folder) / "plaza.csv", seed=seed)
+            tracks = szlib.read_tracks(path)
+        row = {"crowd": "plaza", "seed": seed}
+        row |= judge(tracks, lone=asked.lone, area=szlib.ATC_SQUARE)
+        yield row | says_truth(row, truth)
+
+
+def says_truth(row: dict[str, Any], truth: dict[str, float]) -> dict[str, bool]:
+    """Whether the interval of each quantity of a `row` holds its true value."""
+    ends = {
+        name: [row.get(f"{name}_{end}", np.nan) for end in ("low", "high")]
+        for name in truth
+    }
+    return {
+        f"holds_{name}": low <= truth[name] <= high
+        for name, (low, high) in ends.items()
+    }
+
+
+def judge(
+    tracks: pd.DataFrame, *, lone: bool, area: szlib.Square = AREA
+) -> dict[str, Any]:
     """Fit a zone to `tracks`, and describe its verdict and its intervals."""
     start = time.process_time()
     if lone:
-        samples = szlib.find_encounters(tracks, area=AREA)
-        null = szlib.null_encounters(tracks, area=AREA, shifts=SHIFTS, progress=False)
+        samples = szlib.find_encounters(tracks, area=area)
+        null = szlib.null_encounters(tracks, area=area, shifts=SHIFTS, progress=False)
     else:
-        samples = szlib.find_pairs(tracks, area=AREA)
-        null = szlib.null_pairs(tracks, area=AREA, shifts=SHIFTS, progress=False)
+        samples = szlib.find_pairs(tracks, area=area)
+        null = szlib.null_pairs(tracks, area=area, shifts=SHIFTS, progress=False)
     test = szlib.null_test(samples, null)
     sensor = (
         test.sensor is not None and test.sensor.loses_people and test.p_beyond > 0.05
@@ -113,11 +140,12 @@ def count(table: pd.DataFrame) -> pd.DataFrame:
 def main() -> None:
     """Judge the crowds that the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["none", "zone", "short"])
+    parser.add_argument("what", choices=["none", "zone", "plaza", "short"])
     parser.add_argument("names", nargs="*")
     parser.add_argument("--crowds", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--people", type=int, default=1200)
+    parser.add_argument("--seconds", type=float, default=1800.0, help="recorded")
     parser.add_argument("--rate", type=float, default=10.0)
     parser.add_argument("--noise", type=float, default=0.0)
     parser.add_argument("--lone", action="store_true", help="lone encounters")
@@ -126,7 +154,7 @@ def main() -> None:
     asked = parser.parse_args()
     if asked.what == "short":
         asked.names, asked.crowds = list(SHORT), 2
-    judges = judge_zones if asked.what == "zone" else judge_crowds
+    judges = {"zone": judge_zones, "plaza": judge_plazas}.get(asked.what, judge_crowds)
     found = []
     for row in judges(asked.names, asked):
         found.append(row)

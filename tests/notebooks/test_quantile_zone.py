@@ -6,21 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.passers import TRUTH, passers
+from studies import quantile_zone
+from studies.quantile_zone import Approaches, quantile_radii
 
 import szlib
-from szlib.zones.polar import DIRECTIONS, ellipse_reach
-from szlib.zones.quantile import (
-    SPEED_BAND,
-    Approaches,
-    encounter_numbers,
-    quantile_radii,
-    smooth_paths,
-)
+from szlib.zones.ellipses import DIRECTIONS, ellipse_reach
+from szlib.zones.uncertainty import SPEED_BAND
 
 
 def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:
     zone = szlib.SocialZone.fit(
-        samples, method="quantile", speeds=(1.1,), n_resamples=0, **options
+        samples, method=quantile_zone.NAME, speeds=(1.1,), n_resamples=0, **options
     )
     found = zone.ellipses[1.1]
     return np.array([*found.center, *found.semi_axes, found.angle])
@@ -137,55 +133,6 @@ def test_weights_equal_copies(samples: pd.DataFrame) -> None:
     assert np.isnan(empty).all()
 
 
-# --- smoothing ---------------------------------------------------------------------------------------
-
-
-def test_smoothing_keeps_straight_and_evenly_curved_paths() -> None:
-    t = np.arange(31) / 10
-    x, y = 3 - 1.5 * t + 0.2 * t**2, 0.7 + 0.1 * t - 0.05 * t**2
-    path = pd.DataFrame(
-        {
-            "encounter": 0,
-            "t": t,
-            "los_angle": np.arctan2(y, x),
-            "distance": np.hypot(x, y),
-        }
-    )
-    angle, distance = smooth_paths(path)
-    np.testing.assert_allclose(angle, path["los_angle"], atol=1e-12)
-    np.testing.assert_allclose(distance, path["distance"], atol=1e-12)
-
-
-def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) -> None:
-    some = samples[samples["encounter"] < 3].reset_index(drop=True)
-    gap = some[(some["encounter"] != 1) | ((some["t"] - 10).abs() > 0.25)]
-    together = smooth_paths(gap)
-    parts = [gap[gap["encounter"] == 0], gap[(gap["encounter"] == 1) & (gap["t"] < 10)]]
-    parts += [
-        gap[(gap["encounter"] == 1) & (gap["t"] > 10)],
-        gap[gap["encounter"] == 2],
-    ]
-    for k in (0, 1):
-        np.testing.assert_allclose(
-            np.concatenate([smooth_paths(p)[k] for p in parts]), together[k], atol=1e-12
-        )
-    untimed = smooth_paths(some.drop(columns="t"))
-    np.testing.assert_array_equal(untimed[1], some["distance"])
-
-
-def test_smoothing_treats_past_and_future_alike() -> None:
-    path = passers(1, noise=0.05)
-    back = path.assign(t=-path["t"].to_numpy())
-    for forward, backward in zip(smooth_paths(path), smooth_paths(back), strict=True):
-        np.testing.assert_allclose(forward, backward, atol=1e-12)
-
-
-def test_smoothing_reduces_noise() -> None:
-    still, noisy = passers(200), passers(200, noise=0.05)
-    error = smooth_paths(noisy)[1] - still["distance"]
-    assert error.std() < 0.6 * (noisy["distance"] - still["distance"]).std()
-
-
 # --- what cannot be used -----------------------------------------------------------------------------
 
 
@@ -223,22 +170,15 @@ def test_samples_without_a_quantile_zone_are_refused(
         ellipse(samples.drop(columns="distance"))
 
 
-def test_encounters_are_numbered_in_order_of_appearance() -> None:
-    table = pd.DataFrame({"encounter": [5, 5, 2, 5], "day": ["a", "a", "a", "b"]})
-    number, first = encounter_numbers(table)
-    assert number.tolist() == [0, 0, 1, 2]
-    assert first.index.tolist() == [0, 2, 3]
-    assert encounter_numbers(table.drop(columns="encounter"))[0].tolist() == [
-        0,
-        1,
-        2,
-        3,
-    ]
+def test_a_share_of_nobody_is_refused(samples: pd.DataFrame) -> None:
+    message = "q must be a share of encounters, 0 < q < 1; got 0"
+    with pytest.raises(szlib.ZoneError, match=message):
+        ellipse(samples, q=0.0)
 
 
 def test_provenance_names_the_sector_in_degrees(samples: pd.DataFrame) -> None:
     zone = szlib.SocialZone.fit(
-        samples, method="quantile", speeds=(1.1,), n_resamples=0
+        samples, method=quantile_zone.NAME, speeds=(1.1,), n_resamples=0
     )
     assert zone.provenance["parameters"]["sector_deg"] == 35
 
