@@ -35,8 +35,8 @@
 # By default everything runs on a *synthetic plaza*: its people are computed, and we know the zone that they keep. The mall is a
 # real place, recorded on 2012-10-24. Nobody knows the true zone there, and each person has one position a second. In an
 # *encounter* two people meet, and nobody else is near. The day has 252 encounters; 101 are of *companions*, who walk close by
-# choice. 252 are too few: the verdict on the zone is *undecided*. The folder `real_day` holds chapters 01 to 06, 09 to 11 and notebook 28, executed on that day: [tracks](real_day/01_tracks.ipynb), [zone](real_day/05_zones.ipynb), [respect or
-# emptiness](real_day/06_respect.ipynb).
+# choice. The verdict on the zone of the day is *undecided*: its tracker loses people who are near each other. The folder `real_day` holds chapters 01 to 06, 09 to 11 and notebook 28, executed on that day: [tracks](real_day/01_tracks.ipynb), [distances](real_day/05_zones.ipynb), [respect,
+# and the zone](real_day/06_respect.ipynb).
 
 # %% [markdown]
 # ## Readers, and what you need to know
@@ -53,7 +53,7 @@
 # %% [markdown]
 # ## Three routes
 #
-# - **The idea.** [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 55 min to read.
+# - **The idea.** [06](06_respect.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 00 min to read.
 # - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 6 h 30 min to read.
 # - **The course, in six weeks.** Reading and exercises; running and looking around come on top.
 #

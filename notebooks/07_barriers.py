@@ -34,7 +34,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [06](06_respect.ipynb) · next: [8 - Build the controller
 # yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 1-7 · 50
-# min · needs [05](05_zones.ipynb) · exercises:
+# min · needs [06](06_respect.ipynb) · exercises:
 # [4.2](exercises/sheet4_own_zone.ipynb#4.2-The-speed-limit-(5-min)),
 # [5.1-5.4](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)),
 # [5.8](exercises/sheet5_barriers.ipynb#5.8-In-your-own-words-(10-min)) · laboratory:

@@ -17,7 +17,7 @@ from szlib.workbook import folders, runner
 HERE = Path(__file__).parents[1]
 LAB = HERE.parent / "results" / "lab"
 PICTURES = {
-    "zone.png": "05_zones-zone.png",
+    "zone.png": "06_respect-robot.png",
     "los.png": "02_encounters-los.png",
     "hull.png": "04_hull-hull.png",
     "corridor.png": "10_corridor-scenario.png",

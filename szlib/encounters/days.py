@@ -12,7 +12,7 @@ import io
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
@@ -45,9 +45,6 @@ from .near_rows import read_near_area
 from .samples import no_samples
 from .settings import EncounterSettings
 
-# With fewer encounters, what relaxing a condition would give is stated (assumed: in 22 of the ETH
-# sequence no zone is found).
-FEW_ENCOUNTERS = 60
 # Advice by a word of the condition that rejected everything.
 _ADVICE = {
     "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
@@ -72,15 +69,23 @@ def find_encounters_in_files(
     `settings` say what counts as an encounter, `recipe` how the files are read.  Raises DataError also where
     a file changes meanwhile.
     """
+    tracks, settings = read_for_encounters(files, settings, recipe)
+    if len(tracks) == 0:
+        return funnels.attach(no_samples(), funnels.get(tracks))
+    return find_encounters(tracks, settings=settings)
+
+
+def read_for_encounters(
+    files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
+) -> tuple[pd.DataFrame, EncounterSettings]:
+    """The tracks on which encounters in the `files` of one day depend, and the `settings` with their area."""
     with unchanged_files(files):
         area = known_area(settings, files, recipe)
         raw = read_near_area(
             files, area=area, duration=settings.duration, recipe=recipe
         )
     tracks = to_clock(raw, max_gap=recipe.max_gap) if len(raw) else raw
-    if len(tracks) == 0:
-        return funnels.attach(no_samples(), funnels.get(tracks))
-    return find_encounters(tracks, settings=replace(settings, area=area or AUTO))
+    return tracks, replace(settings, area=area or AUTO)
 
 
 def with_area(
@@ -130,57 +135,9 @@ def known_area(
     return as_area(known) if known and known != AUTO else None
 
 
-def relax_conditions(
-    samples: pd.DataFrame,
-    read: Callable[[], pd.DataFrame],
-    settings: EncounterSettings,
-) -> str:
-    """What relaxing one condition of an encounter would give: a sentence; "" with `FEW_ENCOUNTERS` or more.
-
-    `samples` were found with the `settings` in the tracks that `read` gives.  The first condition named
-    costs most.
-    """
-    count = samples["encounter"].nunique()
-    if count >= FEW_ENCOUNTERS or "area" not in samples.attrs:
-        return ""
-    tracks = read()
-    settings = replace(settings, area=as_area(samples.attrs["area"]))
-    space, half = settings.space, max(settings.steps // 2 / 10, 0.1)
-    small = replace(
-        space, width=round(space.width / 2, 1), length=round(0.6 * space.length, 1)
-    )
-    size = f"{small.width:g} m x {small.length:g} m"
-    relaxed: dict[str, dict[str, Any]] = {
-        f"an attentional space of {size} (space_width, space_length)": {"space": small},
-        "a space that may reach beyond the outline, if this is a wall (has_walls)": {
-            "has_walls": True
-        },
-        f"windows of {half:g} s (duration)": {"duration": half},
-        "any distance at the opening (min_distance)": {"min_distance": 0.0},
-        f"people of {settings.min_speed / 2:g} m/s (min_speed)": {
-            "min_speed": settings.min_speed / 2
-        },
-    }
-    found = [
-        (
-            find_encounters(tracks, settings=replace(settings, **change))[
-                "encounter"
-            ].nunique(),
-            name,
-        )
-        for name, change in relaxed.items()
-    ]
-    more = "; ".join(
-        f"{name}: {n:,} encounters"
-        for n, name in sorted(found, reverse=True)
-        if n > count
-    )
-    return f"{count} encounters are few; one condition relaxed gives {f'more: {more}' if more else 'no more'}"
-
-
-def require_encounters(samples: pd.DataFrame, advice: str = "") -> pd.DataFrame:
+def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the `samples` if there are any; else raise DataError: the stage that rejected everything, why,
-    and what to do, with the `advice` of `relax_conditions`."""
+    and what to do."""
     if len(samples):
         return samples
     stages = [stage for stage in funnels.get(samples) if stage["entered"]]
@@ -200,7 +157,6 @@ def require_encounters(samples: pd.DataFrame, advice: str = "") -> pd.DataFrame:
     raise DataError(
         f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
         f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {usual}"
-        + (f"; {advice}" if advice else "")
     )
 
 

@@ -211,6 +211,19 @@ def find_pairs(
     return of_kind(funnels.attach(samples, [*funnels.get(tracks), stage]), kinds)
 
 
+def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
+    """How many pairs of `tracks` in an `area` are compared with chance, and what they say of the sensor."""
+    crowd = Crowd.from_tracks(tracks, area)
+    met = crowd.meet(np.zeros(len(crowd.streams), np.int64), CLOSE)
+    n = int(np.isin(met.kind, [KINDS.index(kind) for kind in COMPARED]).sum())
+    resolved = crowd.sensor.resolved
+    loses = f"it loses people who are nearer than {resolved:.1f} m to each other"
+    return (
+        f"pairs who come towards each other or cross, within {CLOSE:g} m: {n:,}\n"
+        f"sensor: {crowd.sensor}: {loses if resolved else 'it loses nobody for that'}"
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Meetings:
     """Pairs of people who come near each other.

@@ -26,7 +26,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -215,8 +214,10 @@ def _notebooks(options: argparse.Namespace) -> int:
 
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
-    from .. import EncounterSettings, read_tracks
-    from ..encounters.days import find_encounters_in_files, relax_conditions
+    from .. import EncounterSettings, find_encounters
+    from ..encounters.days import read_for_encounters
+    from ..encounters.finding import find_place
+    from ..encounters.pairs import describe_pairs
     from ..tracks import datasets, funnels
     from ..tracks.readers import describe_file
     from ..tracks.recipe import COMMAND_VARIABLE, FILE_NAME
@@ -233,16 +234,16 @@ def _inspect(options: argparse.Namespace) -> int:
     with warnings.catch_warnings(
         action="ignore", category=DataWarning
     ):  # the table shows the same counts
-        samples = find_encounters_in_files(files, settings, reading)
-        read = partial(read_tracks, files, recipe=reading)
-        advice = relax_conditions(samples, read, settings)
-    if "area" in samples.attrs:
-        print(f"area {samples.attrs['area']}")
-        if samples.attrs["area_reason"]:
-            print(f"area found: {samples.attrs['area_reason']}")
+        samples, settings = read_for_encounters(files, settings, reading)
+        if len(samples):
+            tracks, area = find_place(samples, settings)
+            samples = find_encounters(tracks, settings=replace(settings, area=area))
+            print(f"area {area}")
+            if area.reason:
+                print(f"area found: {area.reason}")
     print(funnels.text(funnels.get(samples)))
-    if advice:
-        print(advice)
+    if "area" in samples.attrs:
+        print(describe_pairs(tracks, area))
     command = f"{os.environ.get(COMMAND_VARIABLE, 'the same command')} --save"
     if options.save is not None:
         if "area" in samples.attrs:

@@ -144,8 +144,7 @@ def _fit_files(
         options: Any = {"kinds": kind, "method": method, "progress": True}
         return SocialZone.from_tracks(table, area=area, **options), table
     samples = find_encounters(table, settings=settings)
-    advice = several_days.relax_conditions(samples, lambda: table, settings)
-    several_days.require_encounters(samples, advice)
+    several_days.require_encounters(samples)
     return _fit_lone_encounters(samples, table, settings, method, kind, jobs), table
 
 

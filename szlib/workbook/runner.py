@@ -144,9 +144,6 @@ def _describe_data(
         is_undecided = any(o["status"] == "undecided" for o in outcomes.values())
         if not verdict and is_undecided:
             verdict = f"undecided: {describe_missing_data(samples)}"
-        if advice := table.attrs.get("advice"):
-            found["warnings"] += [] if verdict else [advice]
-            verdict = f"{verdict}; {advice.partition('; ')[2]}" if verdict else ""
     return found | ({"verdict": verdict} if verdict else {})
 
 

@@ -136,12 +136,9 @@ class DataCache:
     def store_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Store the `samples` of encounters for later notebooks, and return them.
 
-        Raises DataError, which names the condition that rejected the last rows, if there are none.  If there
-        are few, ``.attrs["advice"]`` says what relaxing a condition would give.
+        Raises DataError, which names the condition that rejected the last rows, if there are none.
         """
-        settings = self.method.encounter_settings()
-        advice = days.relax_conditions(samples, self.tracks, settings)
-        days.require_encounters(samples, advice).attrs["advice"] = advice
+        days.require_encounters(samples)
         content = io.BytesIO()
         samples.to_parquet(content)
         store_cached(
