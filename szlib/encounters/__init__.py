@@ -9,7 +9,8 @@ finding          the four conditions of the paper: `find_encounters`
 samples          what is measured in a window
 near_rows        the rows of a track table or file that encounters in an area can depend on
 days             from the files of days to their encounters, resumable, on one machine or many: `extract_days`
-pairs            every pair of people, and streams that are moved in time: `find_pairs`; the sensor
+pairs            every pair of people, and streams that are moved in time: `find_pairs`
+sensor           people that it loses, its noise, and ids that it exchanges: `SensorCheck`
 null_model       the same people, each moved in time: `time_shifted`, `null_encounters`, `null_pairs`
 """
 
@@ -19,8 +20,9 @@ from .finding import find_encounters
 from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
 from .kinds import KINDS, of_kind
 from .null_model import NullEncounters, null_encounters, null_pairs, time_shifted
-from .pairs import SensorCheck, find_pairs
+from .pairs import find_pairs
 from .samples import SAMPLE_COLUMNS
+from .sensor import SensorCheck
 from .settings import EncounterSettings
 
 __all__ = [

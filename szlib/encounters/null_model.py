@@ -37,8 +37,9 @@ from .finding import find_encounters, find_place
 from .geometry import Area
 from .kinds import KINDS, REACH, TOGETHER, find_near_pairs, of_kind
 from .occupants import TrackRows
-from .pairs import CLOSE, COMPARED, Crowd, SensorCheck, name_kinds
+from .pairs import CLOSE, COMPARED, Crowd, name_kinds
 from .samples import sample_rows
+from .sensor import SensorCheck
 from .settings import EncounterSettings
 
 # Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed).  A

@@ -12,11 +12,6 @@ stream    units with the same direction of travel: one of eight sectors of 45 de
 
 Two people of one stream keep their distance in all shifts, so they tell nothing, and are "same direction".
 Compared are pairs of different streams who come towards each other or cross.
-
-A tracker can fake respect: one that loses one of two people who come near each other leaves no pair nearer
-than the distance that it resolves, as if they kept apart. It shows where tracks end and begin: in a merging
-tracker most tracks that end inside the area do so beside somebody else. So at each distance the share of ends
-with a stranger there is compared with the share of all samples.
 """
 
 from __future__ import annotations
@@ -27,10 +22,8 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.stats import beta
 
 from ..core.checks import require
 from ..core.errors import DataError
@@ -54,96 +47,15 @@ from .kinds import (
 )
 from .occupants import TrackRows, find_neighbours
 from .samples import sample_rows
-from .settings import EncounterSettings
-
-NEAR_END = 0.6
-"""Distance at which somebody is near the end of a track [m]."""
-
-_EDGES = np.arange(0.2, 1.25, 0.1)  # of the distances at which ends are counted [m]
-_MOST = (
-    2.0  # times as many ends as samples at a distance that a sound tracker has at most
+from .sensor import (
+    BEFORE,
+    NEAR_END,
+    SensorCheck,
+    count_ends,
+    is_exchanged,
+    measure_noise,
 )
-_FEWEST = 5  # ends that say something
-_SMALL = 0.005  # level at which a distance counts as not resolved
-
-
-@dataclass(frozen=True)
-class SensorCheck:
-    """Ends of tracks inside the area beside somebody else, against all samples.
-
-    Parameters
-    ----------
-    ends, samples : number of beginnings and ends of tracks inside the area, and of all samples there.
-    ends_near, ends_low, ends_high : share of the ends with a stranger within 0.6 m, and its interval.
-    samples_near : the same share of all samples.
-    resolved : distance beyond which no more tracks end than elsewhere [m]; 0: at every distance.
-
-    Examples
-    --------
-    >>> from szlib.encounters import SensorCheck
-    >>> SensorCheck(50, 9000, 0.6, 0.45, 0.73, 0.01, 0.5).loses_people
-    True
-    """
-
-    ends: int
-    samples: int
-    ends_near: float
-    ends_low: float
-    ends_high: float
-    samples_near: float
-    resolved: float
-
-    @property
-    def loses_people(self) -> bool:
-        """Whether tracks end beside other people more often than chance explains."""
-        return self.resolved > 0
-
-    def __str__(self) -> str:
-        return (
-            f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
-            f"of tracks have somebody within {NEAR_END:g} m, and {self.samples_near:.1%} of all samples"
-        )
-
-
-def check_sensor(
-    rows: TrackRows, inside: np.ndarray, one: np.ndarray, other: np.ndarray
-) -> SensorCheck:
-    """Compare the ends of tracks with all samples.
-
-    Parameters
-    ----------
-    rows : of the tracks, by person and time.
-    inside : whether each of them is in the area.
-    one, other : rows of two strangers at one moment who are near each other, shape (n,).
-    """
-    is_end = _find_ends(rows, inside)
-    distance = np.hypot(rows.x[one] - rows.x[other], rows.y[one] - rows.y[other])
-    nearest = np.full(len(rows), np.inf)
-    np.minimum.at(nearest, one, distance)
-    np.minimum.at(nearest, other, distance)
-    ends, samples = nearest[is_end], nearest[inside]
-    resolved = 0.0
-    for low, high in zip(np.r_[0, _EDGES[:-1]], _EDGES, strict=True):
-        k, n = int(((ends >= low) & (ends < high)).sum()), len(ends)
-        expected = (
-            float(((samples >= low) & (samples < high)).mean()) if len(samples) else 0.0
-        )
-        if k >= _FEWEST and beta.ppf(_SMALL, k, n - k + 1) > _MOST * expected:
-            resolved = float(high)
-    k, n = int((ends < NEAR_END).sum()), len(ends)
-    low, high = beta.ppf([0.025, 0.975], [k + 0.5] * 2, [n - k + 0.5] * 2)
-    near = float((samples < NEAR_END).mean()) if len(samples) else 0.0
-    return SensorCheck(
-        n, len(samples), k / max(n, 1), float(low), float(high), near, resolved
-    )
-
-
-def _find_ends(rows: TrackRows, inside: np.ndarray) -> NDArray[np.bool_]:
-    """Whether a track begins or ends at each row inside the area, but for those cut by the recording."""
-    breaks = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
-    recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
-    return np.asarray((np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded)
-
+from .settings import EncounterSettings
 
 CLOSE = 2.0  # people farther apart [m] do not belong to a zone (paper: r_max)
 
@@ -217,10 +129,10 @@ def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
     met = crowd.meet(np.zeros(len(crowd.streams), np.int64), CLOSE)
     n = int(np.isin(met.kind, [KINDS.index(kind) for kind in COMPARED]).sum())
     resolved = crowd.sensor.resolved
-    loses = f"it loses people who are nearer than {resolved:.1f} m to each other"
+    loses = f"loses people who are nearer than {resolved:.1f} m to each other"
     return (
         f"pairs who come towards each other or cross, within {CLOSE:g} m: {n:,}\n"
-        f"sensor: {crowd.sensor}: {loses if resolved else 'it loses nobody for that'}"
+        f"sensor: it {loses if resolved else 'resolves people at every distance'}: {crowd.sensor}"
     )
 
 
@@ -332,11 +244,33 @@ class Crowd:
 
     @cached_property
     def sensor(self) -> SensorCheck:
-        """What ends of tracks near other people say about the sensor."""
+        """What the tracks say about the sensor."""
         still = np.zeros(len(self.streams), np.int64)
         met = self.meet(still, CLOSE)
         one, other, _ = self.sample(met, np.flatnonzero(met.kind > 0), CLOSE)
-        return check_sensor(self.rows, self.inside, one, other)
+        found = count_ends(self.rows, self.inside, one, other)
+        found |= measure_noise(self.rows, self.inside)
+        exchanged = self._exchanges(
+            met.pair[(met.kind > _STANDING) & (met.nearest < NEAR_END)]
+        )
+        return SensorCheck(
+            **found, passes=len(exchanged), exchanged=int(exchanged.sum())
+        )
+
+    def _exchanges(self, pairs: np.ndarray) -> np.ndarray:
+        """Whether the ids of people look exchanged who pass near the coarse rows `pairs` (n, 2)."""
+        rows = self.rows
+        one, other, known = self._along(
+            self.coarse[pairs[:, 0]], self.coarse[pairs[:, 1]], _AROUND
+        )
+        apart = np.hypot(rows.x[one] - rows.x[other], rows.y[one] - rows.y[other])
+        at = np.argmin(np.where(known, apart, np.inf), axis=1)[:, None]
+        one, other = (
+            np.take_along_axis(each, at, axis=1)[:, 0] for each in (one, other)
+        )
+        one, other, known = self._along(one, other, np.array([-BEFORE, BEFORE]))
+        ends = np.stack([one, other], axis=2)[known.all(axis=1)]
+        return is_exchanged(rows, ends[:, 0], ends[:, 1])
 
     def draw(
         self, rng: np.random.Generator, minutes: tuple[float, float]

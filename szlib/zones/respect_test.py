@@ -53,7 +53,7 @@ from ..core.checks import Array, check_columns
 from ..core.errors import ZoneError, warn
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
-from ..encounters.pairs import SensorCheck
+from ..encounters.sensor import SensorCheck
 from .outliers import R_MAX, nearest_approaches
 from .respect_likelihood import EXCESS_PRIOR, respect_factor
 from .smoothing import smooth_paths

@@ -34,7 +34,8 @@ from ..core.input_files import read_small, reading
 from ..encounters.finding import find_place
 from ..encounters.kinds import of_kind
 from ..encounters.null_model import NullEncounters, null_pairs
-from ..encounters.pairs import SensorCheck, find_pairs
+from ..encounters.pairs import find_pairs
+from ..encounters.sensor import SensorCheck
 from ..encounters.settings import EncounterSettings
 from .ellipses import Ellipse, EllipseZone
 from .estimators import Estimator, ZoneShape

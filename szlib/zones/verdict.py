@@ -79,7 +79,10 @@ def judge(zone: FittedZone, speed: float) -> Verdict:
     reasons += funnels.warnings(zone.provenance.get("funnel", []))
     reasons += [*_null_model(zone), *_sensor(zone)]
     reasons += [*_place(zone, speed), *_width(zone, speed)]
-    return Verdict(UNDECIDED, reasons) if reasons else Verdict(USABLE, [f"{test}"])
+    if reasons:
+        return Verdict(UNDECIDED, reasons)
+    sensor = [] if test.sensor is None else [f"sensor: {test.sensor}"]
+    return Verdict(USABLE, [f"{test}", *sensor])
 
 
 def describe_missing_encounters(provenance: Mapping[str, Any]) -> str:

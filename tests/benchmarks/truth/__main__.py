@@ -156,7 +156,10 @@ def main() -> None:
         asked.names, asked.crowds = list(SHORT), 2
     judges = {"zone": judge_zones, "plaza": judge_plazas}.get(asked.what, judge_crowds)
     found = []
+    sensor = f", {asked.rate:g} Hz" if asked.rate != 10 else ""
+    sensor += f", {100 * asked.noise:g} cm of noise" if asked.noise else ""
     for row in judges(asked.names, asked):
+        row["crowd"] += sensor
         found.append(row)
         print(
             {k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()},

@@ -1,0 +1,190 @@
+"""What tracks say about the sensor that made them: the people it loses, its noise, and the ids it exchanges.
+
+A tracker can fake respect: one that loses one of two people who come near each other leaves no pair nearer
+than the distance that it resolves, as if they kept apart. It shows where tracks end and begin: in a merging
+tracker most tracks that end inside the area do so beside somebody else. So at each distance the share of ends
+with a stranger there is compared with the share of all samples.
+
+Noise: a walking person's path is smooth. So the fourth difference of positions, at the rate of the sensor, is
+mostly its error: of a variance 70 times that of a position. Where tracks were interpolated, only the ticks at
+which they bend were measured. Below 5 Hz people turn between two samples, so the number is an upper bound.
+
+Exchanged ids: after two people passed within 0.6 m, each goes on as the other did before.
+
+Measured on crowds whose sensor is known (`tests/benchmarks/truth`): noise of 1, 5 and 10 cm, at 10 and
+2.5 Hz, is found to 3 %. Where half of the pairs within 0.5 m have their ids exchanged, a third of those
+within 0.6 m is found; of the 500 passes of crowds that walk straight on, or swerve, none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta, binom
+
+from .occupants import TrackRows
+
+NEAR_END = 0.6
+"""Distance at which somebody is near the end of a track, or passes close by [m]."""
+
+_EDGES = np.arange(0.2, 1.25, 0.1)  # of the distances at which ends are counted [m]
+# A sound tracker has at most so many times as many ends as samples at a distance.
+_MOST = 2.0
+_FEWEST = 5  # ends that say something
+_SMALL = 0.005  # level at which a distance counts as not resolved
+_MOST_LAG = 20  # steps of the clock between two samples of the slowest sensor
+_BENT = 1e-6  # a path that bends by less is interpolated [m]
+_FEWEST_KNOTS = 10  # fourth differences of a person whose noise is measured
+_FOURTH = np.array([1, -4, 6, -4, 1])
+BEFORE = (
+    12  # steps of the clock before and after a pass at which velocities are compared
+)
+# Exchanged ids: the change of velocity of both people [m/s] that is more than a step aside, and the largest
+# share of it that is left if the ids are exchanged back.
+_TURNED, _LEFT_OVER = 1.0, 0.5
+
+
+@dataclass(frozen=True)
+class SensorCheck:
+    """What tracks say about the sensor, each number with its 95 % interval.
+
+    Parameters
+    ----------
+    ends, samples : number of beginnings and ends of tracks inside the area, and of all samples there.
+    ends_near, ends_low, ends_high : share of the ends with a stranger within 0.6 m, and its interval.
+    samples_near : the same share of all samples.
+    resolved : distance beyond which no more tracks end than elsewhere [m]; 0: at every distance.
+    noise, noise_low, noise_high : standard error of a position [m], the median over people, and its interval;
+        0: none was found.
+    passes, exchanged : number of pairs of strangers who pass within 0.6 m, and of those whose ids look
+        exchanged.
+
+    Examples
+    --------
+    >>> from szlib.encounters import SensorCheck
+    >>> SensorCheck(50, 9000, 0.6, 0.45, 0.73, 0.01, 0.5).loses_people
+    True
+    """
+
+    ends: int
+    samples: int
+    ends_near: float
+    ends_low: float
+    ends_high: float
+    samples_near: float
+    resolved: float
+    noise: float = 0.0
+    noise_low: float = 0.0
+    noise_high: float = 0.0
+    passes: int = 0
+    exchanged: int = 0
+
+    @property
+    def loses_people(self) -> bool:
+        """Whether tracks end beside other people more often than chance explains."""
+        return self.resolved > 0
+
+    def __str__(self) -> str:
+        low, high = _interval_of_share(self.exchanged, self.passes)
+        noise = (
+            "no error of positions was found"
+            if self.noise == 0
+            else f"a position errs by {100 * self.noise:.1f} cm ({100 * self.noise_low:.1f} to "
+            f"{100 * self.noise_high:.1f})"
+        )
+        return (
+            f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
+            f"of tracks have somebody within {NEAR_END:g} m, and {self.samples_near:.1%} of all samples; "
+            f"{noise}; {self.exchanged:,} of {self.passes:,} pairs who pass within {NEAR_END:g} m "
+            f"({low:.0%} to {high:.0%}) look exchanged"
+        )
+
+
+def count_ends(
+    rows: TrackRows, inside: np.ndarray, one: np.ndarray, other: np.ndarray
+) -> dict[str, Any]:
+    """Compare the ends of tracks with all samples: the fields of `SensorCheck` from ends to resolved.
+
+    Parameters
+    ----------
+    rows : of the tracks, by person and time.
+    inside : whether each of them is in the area.
+    one, other : rows of two strangers at one moment who are near each other, shape (n,).
+    """
+    is_end = _find_ends(rows, inside)
+    distance = np.hypot(rows.x[one] - rows.x[other], rows.y[one] - rows.y[other])
+    nearest = np.full(len(rows), np.inf)
+    np.minimum.at(nearest, one, distance)
+    np.minimum.at(nearest, other, distance)
+    ends, samples = nearest[is_end], nearest[inside]
+    resolved, n = 0.0, len(ends)
+    for low, high in zip(np.r_[0, _EDGES[:-1]], _EDGES, strict=True):
+        k = int(((ends >= low) & (ends < high)).sum())
+        expected = _share((samples >= low) & (samples < high))
+        if k >= _FEWEST and beta.ppf(_SMALL, k, n - k + 1) > _MOST * expected:
+            resolved = float(high)
+    low, high = _interval_of_share(int((ends < NEAR_END).sum()), n)
+    return {
+        "ends": n,
+        "samples": len(samples),
+        "ends_near": _share(ends < NEAR_END),
+        "ends_low": low,
+        "ends_high": high,
+        "samples_near": _share(samples < NEAR_END),
+        "resolved": resolved,
+    }
+
+
+def _find_ends(rows: TrackRows, inside: np.ndarray) -> NDArray[np.bool_]:
+    """Whether a track begins or ends at each row inside the area, but for those cut by the recording."""
+    breaks = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
+    recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
+    return np.asarray((np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded)
+
+
+def measure_noise(rows: TrackRows, inside: np.ndarray) -> dict[str, Any]:
+    """Measure the error of positions: the fields of `SensorCheck` that begin with noise."""
+    at = np.arange(1, len(rows) - 1)
+    at = at[rows.piece[at - 1] == rows.piece[at + 1]]
+    bends = [v[at - 1] - 2 * v[at] + v[at + 1] for v in (rows.x, rows.y)]
+    is_bent = np.hypot(*bends) > _BENT
+    lag = int(np.clip(np.rint(1 / max(_share(is_bent), 1e-9)), 1, _MOST_LAG))
+    at = at[is_bent]
+    at = at[(at >= 2 * lag) & (at < len(rows) - 2 * lag)]
+    at = at[(rows.piece[at - 2 * lag] == rows.piece[at + 2 * lag]) & inside[at]]
+    steps = zip(_FOURTH, lag * np.arange(-2, 3), strict=True)
+    weighted = [(weight, at + step) for weight, step in steps]
+    fourth = [sum(w * v[row] for w, row in weighted) for v in (rows.x, rows.y)]
+    variance = (fourth[0] ** 2 + fourth[1] ** 2) / (2 * (_FOURTH**2).sum())
+    knots = np.bincount(rows.person[at])
+    of_person = np.bincount(rows.person[at], variance)[knots >= _FEWEST_KNOTS]
+    errors = np.sort(np.sqrt(of_person / knots[knots >= _FEWEST_KNOTS]))
+    if len(errors) <= _FEWEST:
+        return {}
+    ends = binom.ppf([0.025, 0.975], len(errors), 0.5).astype(int)
+    low, high = errors[np.clip(ends - np.array([1, 0]), 0, len(errors) - 1)].tolist()
+    return {"noise": float(np.median(errors)), "noise_low": low, "noise_high": high}
+
+
+def is_exchanged(
+    rows: TrackRows, before: np.ndarray, after: np.ndarray
+) -> NDArray[np.bool_]:
+    """Whether two people go on as the other did before; `before` and `after` are rows of both, (n, 2)."""
+    velocity = rows.vx + 1j * rows.vy
+    was, goes = velocity[before], velocity[after]
+    own, exchanged = (np.abs(goes - each).sum(axis=1) for each in (was, was[:, ::-1]))
+    return np.asarray((own > _TURNED) & (exchanged < _LEFT_OVER * own))
+
+
+def _share(is_so: np.ndarray) -> float:
+    """The share of those that are so; 0 of none."""
+    return float(is_so.mean()) if len(is_so) else 0.0
+
+
+def _interval_of_share(k: int, n: int) -> tuple[float, float]:
+    """The 95 % interval of a share of which `k` of `n` were seen (Jeffreys)."""
+    low, high = beta.ppf([0.025, 0.975], k + 0.5, n - k + 0.5)
+    return float(low), float(high)
