@@ -42,7 +42,7 @@ def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(
 ):
     monkeypatch.chdir(tmp_path)
     plaza = make_plaza(
-        tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=1000)
+        tmp_path / "plaza.csv", seed=1, settings=PlazaSettings(n_encounters=1000)
     )
     tracks = szlib.read_tracks(plaza)
     hall = pd.DataFrame(
@@ -56,7 +56,7 @@ def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(
     hall.to_csv("hall.csv", index=False)
     found = {"szlib": szlib}
     exec(OWN_DATA, found)
-    assert found["samples"]["encounter"].nunique() > 500
+    assert found["zone"].method == "respect"
     true = PlazaSettings().true_zone(1.1)
     assert found["zone"].ellipse(1.1).semi_axes == pytest.approx(
         true.semi_axes, abs=0.1

@@ -78,7 +78,10 @@ def find_encounters_in_files(
 def read_for_encounters(
     files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
 ) -> tuple[pd.DataFrame, EncounterSettings]:
-    """The tracks on which encounters in the `files` of one day depend, and the `settings` with their area."""
+    """The tracks on which encounters in the `files` of one day depend, and the `settings` with their area.
+
+    The files are read as `recipe` says.
+    """
     with unchanged_files(files):
         area = known_area(settings, files, recipe)
         raw = read_near_area(

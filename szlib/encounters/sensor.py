@@ -146,7 +146,10 @@ def _find_ends(rows: TrackRows, inside: np.ndarray) -> NDArray[np.bool_]:
 
 
 def measure_noise(rows: TrackRows, inside: np.ndarray) -> dict[str, Any]:
-    """Measure the error of positions: the fields of `SensorCheck` that begin with noise."""
+    """Measure the error of positions: the fields of `SensorCheck` that begin with noise.
+
+    `rows` and `inside` are as in `count_ends`.
+    """
     at = np.arange(1, len(rows) - 1)
     at = at[rows.piece[at - 1] == rows.piece[at + 1]]
     bends = [v[at - 1] - 2 * v[at] + v[at + 1] for v in (rows.x, rows.y)]
@@ -172,7 +175,10 @@ def measure_noise(rows: TrackRows, inside: np.ndarray) -> dict[str, Any]:
 def is_exchanged(
     rows: TrackRows, before: np.ndarray, after: np.ndarray
 ) -> NDArray[np.bool_]:
-    """Whether two people go on as the other did before; `before` and `after` are rows of both, (n, 2)."""
+    """Whether two people go on as the other did before.
+
+    `before` and `after` are the numbers of their `rows` before and after they pass, each (n, 2).
+    """
     velocity = rows.vx + 1j * rows.vy
     was, goes = velocity[before], velocity[after]
     own, exchanged = (np.abs(goes - each).sum(axis=1) for each in (was, was[:, ::-1]))

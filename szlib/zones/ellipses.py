@@ -154,8 +154,8 @@ class EllipseZone:
     --------
     >>> from szlib.zones import Ellipse, EllipseZone
     >>> zone = EllipseZone({0.9: Ellipse((0, 0), (1, 1)), 1.1: Ellipse((0.2, 0), (1, 1))})
-    >>> zone.ellipse(1.0).center
-    (0.1, 0.0)
+    >>> round(zone.ellipse(1.0).center[0], 6)
+    0.1
     """
 
     ellipses: Mapping[float, Ellipse]

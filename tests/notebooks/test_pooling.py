@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from scipy import stats
+from studies import quantile_zone
 from studies.pooling import pool
 
 import szlib
@@ -137,10 +138,11 @@ def zone(seed: int, n_resamples: int = 30) -> szlib.SocialZone:
     table = {
         "encounter": np.arange(n),
         "los_angle": rng.uniform(-np.pi, np.pi, n),
-        "speed": 1.1,
+        "speed": rng.uniform(1.0, 1.2, n),
     }
     samples = pd.DataFrame(table).assign(distance=rng.uniform(0.9, 2.5, n))
-    return szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=n_resamples)
+    options = {"speeds": [1.1], "n_resamples": n_resamples}
+    return szlib.SocialZone.fit(samples, method=quantile_zone.NAME, **options)
 
 
 def test_zones_are_pooled_by_their_ellipse_and_its_interval() -> None:

@@ -37,6 +37,7 @@ BY_HAND = {
         "80": 40 + 40,
         "12": 12,  # hours of the day: the train file of hour 12 is thinned
         "13": 13,
+        "92": 92,  # days of the paper
     },
     "06": {
         "0.6": 0.6,

@@ -248,38 +248,6 @@ def test_error_names_the_condition_that_rejected_the_last_rows(reason):
     assert str(square) in str(error.value)
 
 
-def test_advice_about_few_encounters_gives_the_numbers_that_following_it_gives(
-    tmp_path, capsys
-):
-    file = tmp_path / "room.csv"
-    make_hall(size=(7, 6))[["t", "id", "x", "y"]].to_csv(file, index=False)
-    with pytest.raises(
-        szlib.DataError, match="there is no encounter in the area"
-    ) as error:
-        record_of(tmp_path, file).cache.encounters()
-    assert main(["inspect", str(file)]) == 0
-    advice = capsys.readouterr().out.splitlines()[-2]
-    assert str(error.value).endswith(advice)
-    asked = {
-        r"2 m x 3 m \(space_width, space_length\)": {
-            "space_width": 2.0,
-            "space_length": 3.0,
-        },
-        r"\(has_walls\)": {"has_walls": True},
-    }
-    for condition, followed in asked.items():
-        count = int(re.search(condition + r": (\d+) encounters", advice)[1])
-        cache = record_of(
-            tmp_path,
-            file,
-            area=str(szlib.walked_area(szlib.read_tracks(file))),
-            **followed,
-        ).cache
-        assert cache.encounters()["encounter"].nunique() == count > 0
-    assert main(["inspect", "--walls", str(file)]) == 0
-    assert "encounters are few" not in capsys.readouterr().out
-
-
 def test_space_reaches_beyond_an_outline_that_is_a_wall():
     """A person outside the area is no reference pedestrian."""
     walks = (

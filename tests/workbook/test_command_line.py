@@ -38,10 +38,16 @@ def test_inspect_prints_a_funnel_that_adds_up(
     )
     assert described.startswith("spoilt.csv is read as atc-raw")
     assert re.search(r"speed 1\.\d+ m/s \(median\)", described)
-    area, *lines, advice, command = (line.split() for line in printed.splitlines())
+    area, *lines, pairs, sensor, command = (
+        line.split() for line in printed.splitlines()
+    )
     assert " ".join(command) == "go on with: the same command --save"
     assert area == ["area", *str(ATC_SQUARE).split()]
-    assert advice[1:4] == ["encounters", "are", "few;"]
+    assert (pairs[0], int(pairs[-1]) > 0, sensor[:2]) == (
+        "pairs",
+        True,
+        ["sensor:", "it"],
+    )
     counts = [int(line[-1].replace(",", "")) for line in lines]
     assert lines[0][:3] == ["read", "spoilt.csv", "entered"]
     assert counts[0] == len(spoilt.read_text().splitlines())
