@@ -36,7 +36,7 @@ def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(
     }
 
 
-@pytest.mark.filterwarnings("ignore:.*fewer than 20 encounters:szlib.DataWarning")
+@pytest.mark.filterwarnings("ignore:.*fewer than 3 people walked:szlib.DataWarning")
 def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(
     tmp_path, monkeypatch, capsys
 ):

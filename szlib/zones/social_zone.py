@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -262,45 +262,12 @@ class SocialZone:
         fitted_speeds = sorted({float(speed) for speed in speeds})
         if not fitted_speeds:
             raise ZoneError("no speed has a zone: `speeds` is empty")
-        better = None
-        if method is None:
-            better = RespectEstimator.where_better(
-                samples, fitted_speeds, r_max=r_max, null=null
-            )
-        method = method or ("paper" if better is None else "respect")
-        if method == "respect":
-            options = {"null": null}
-        build = partial(METHODS[method][0], r_max=r_max, **options)
-        estimator: Estimator = better or build(samples)
+        method, estimator = _choose_estimator(
+            samples, method, fitted_speeds, r_max=r_max, null=null, **options
+        )
         shape = estimator.fit_shape(fitted_speeds)
-        ellipses, undefined = {}, {}
-        for speed in fitted_speeds:
-            try:
-                ellipses[speed] = shape.ellipse(speed)
-            except ZoneError as error:
-                undefined[speed] = str(error)
-        if not ellipses:
-            reasons, median = "; ".join(undefined.values()), samples["speed"].median()
-            raise ZoneError(
-                f"no speed has a zone: {reasons}; half of the samples are slower than {median:.1f} m/s: "
-                "choose a speed near that, or add data"
-            )
-        provenance = {
-            "szlib": __version__,
-            "days": sorted(map(str, samples["day"].unique()))
-            if "day" in samples
-            else [],
-            "encounters": len(encounter_numbers(samples)[1])
-            if "encounter" in samples
-            else None,
-            "hours": recorded_hours(samples),
-            "parameters": {
-                "method": method,
-                "r_max": float(r_max),
-                **estimator.parameters,
-            },
-            "funnel": estimator.funnel,
-        }
+        ellipses, undefined = _fit_ellipses(shape, fitted_speeds, samples)
+        provenance = _describe_source(samples, estimator, method, r_max)
         test = None
         if null is not None:
             require(
@@ -467,6 +434,62 @@ class SocialZone:
             raise ZoneError(
                 f"{path}: the zone in it is damaged ({error!r}); fit and save it again"
             ) from error
+
+
+def _choose_estimator(
+    samples: pd.DataFrame,
+    method: str | None,
+    speeds: Sequence[float],
+    *,
+    r_max: float,
+    null: NullEncounters | None,
+    **options: Any,
+) -> tuple[str, Estimator]:
+    """The method and its estimator; without a method "respect" where the data shows it, else "paper"."""
+    if method is None:
+        given: Any = {"r_max": r_max, "null": null}
+        if better := RespectEstimator.where_better(samples, speeds, **given):
+            return "respect", better
+        method = "paper"
+    if method == "respect":
+        options = {"null": null}
+    return method, METHODS[method][0](samples, r_max=r_max, **options)
+
+
+def _fit_ellipses(
+    shape: ZoneShape, speeds: Sequence[float], samples: pd.DataFrame
+) -> tuple[dict[float, Ellipse], dict[float, str]]:
+    """The ellipse of a `shape` at each of the `speeds`, and why there is none; ZoneError if all lack one."""
+    ellipses, undefined = {}, {}
+    for speed in speeds:
+        try:
+            ellipses[speed] = shape.ellipse(speed)
+        except ZoneError as error:
+            undefined[speed] = str(error)
+    if not ellipses:
+        reasons, median = "; ".join(undefined.values()), samples["speed"].median()
+        raise ZoneError(
+            f"no speed has a zone: {reasons}; half of the samples are slower than {median:.1f} m/s: "
+            "choose a speed near that, or add data"
+        )
+    return ellipses, undefined
+
+
+def _describe_source(
+    samples: pd.DataFrame, estimator: Estimator, method: str, r_max: float
+) -> dict[str, Any]:
+    """What a zone was made from, and how: its provenance."""
+    known = set(samples)
+    numbers = encounter_numbers(samples)[1] if "encounter" in known else None
+    options = {"method": method, "r_max": float(r_max), **estimator.parameters}
+    return {
+        "szlib": __version__,
+        "days": sorted(map(str, samples["day"].unique())) if "day" in known else [],
+        "encounters": None if numbers is None else len(numbers),
+        "hours": recorded_hours(samples),
+        "parameters": options,
+        "funnel": estimator.funnel,
+    }
 
 
 def recorded_hours(samples: pd.DataFrame) -> float | None:
