@@ -53,7 +53,7 @@
 # %% [markdown]
 # ## Three routes
 #
-# - **The idea.** [06](06_respect.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 00 min to read.
+# - **The idea.** [06](06_respect.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 05 min to read.
 # - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 6 h 30 min to read.
 # - **The course, in six weeks.** Reading and exercises; running and looking around come on top.
 #

@@ -33,7 +33,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [04](04_hull.ipynb) · next: [6 - Respect or
-# emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 30 min · needs
+# emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 25 min · needs
 # [04](04_hull.ipynb) · exercises:
 # [3.4](exercises/sheet3_zones.ipynb#3.4-The-quantile-zone-in-one-direction-(10-min)),
 # [4.1](exercises/sheet4_own_zone.ipynb#4.1-A-zone-of-your-own-(an-evening,-150-min)),

@@ -32,7 +32,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [05](05_zones.ipynb) · next: [7 - Barriers: how fast may the robot
-# approach?](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 35 min · needs
+# approach?](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 40 min · needs
 # [05](05_zones.ipynb) · exercises: [3.6-3.8](exercises/sheet3_zones.ipynb#3.6-A-p-value-(10-min))
 #
 # **Afterwards you can** tell respect from emptiness by a null model, and say whether a zone can be used.

@@ -32,6 +32,7 @@
 # [06](../06_respect.ipynb)
 #
 # **Afterwards you can** say which claims of the paper the data supports, and with which interval.
+# **Words.** *ORCA*: a model of walking: each of two people takes half of what keeps them apart.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook

@@ -31,8 +31,7 @@
 # [Start](../00_start_here.ipynb) · before: [28](28_sentences.ipynb) ·
 # [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 30 min · needs [12](../12_among_people.ipynb)
 #
-# **Afterwards you can** say which safety claims of the controller hold among people who react. **Words.**
-# *ORCA*: a model of walking: each of two people takes half of what keeps them apart.
+# **Afterwards you can** say which safety claims of the controller hold among people who react.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook

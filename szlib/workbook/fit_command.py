@@ -142,7 +142,12 @@ def _fit_files(
     table, settings = read_tracks(files, recipe=reading), replace(settings, area=area)
     if method in (None, "respect"):
         options: Any = {"kinds": kind, "method": method, "progress": True}
-        return SocialZone.from_tracks(table, area=area, **options), table
+        try:
+            return SocialZone.from_tracks(table, area=area, **options), table
+        except DataError as error:
+            raise DataError(
+                f"{error}; the paper's zone of lone encounters may still be found: --method paper"
+            ) from error
     samples = find_encounters(table, settings=settings)
     several_days.require_encounters(samples)
     return _fit_lone_encounters(samples, table, settings, method, kind, jobs), table

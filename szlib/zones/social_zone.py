@@ -196,8 +196,8 @@ class SocialZone:
         pairs = of_kind(find_pairs(tracks, area=place, r_max=r_max), kinds)
         if pairs.empty:
             raise DataError(
-                f"no two people, of the kinds compared, came within {r_max:g} m of each other in the area "
-                f"{place}: use more data, or give a larger area"
+                f"no two people who come towards each other or cross came within {r_max:g} m of each other "
+                f"in the area {place} (kinds: {kinds or 'both'}): use more data, or give a larger area"
             )
         null = null_pairs(
             tracks, area=place, shifts=shifts, seed=seed, r_max=r_max, progress=progress

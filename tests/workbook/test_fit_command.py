@@ -193,7 +193,7 @@ def test_too_few_encounters_are_said_with_what_is_missing(
     )
     assert fit(day, "--out", tmp_path / "zone.json") == 2
     assert (
-        "no two people, of the kinds compared, came within 2 m"
+        "no two people who come towards each other or cross came within 2 m"
         in capsys.readouterr().err
     )
     assert fit(day, "--out", tmp_path / "zone.json", "--method", "paper") == 2
