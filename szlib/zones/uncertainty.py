@@ -3,9 +3,9 @@
 Samples of one encounter are not independent, and two encounters of the same two people are not either. So
 *pairs of people* are resampled (or whole days, if there are many), and the zone is estimated again.
 
-- A quantile varies to both sides. As many pairs as there are are drawn with replacement, and the middle 95 %
-  of the zones are the interval, corrected for their bias so that the zone itself is the median (bootstrap,
-  BC percentiles; Efron, J. Am. Stat. Assoc. 82, 1987).
+- An estimate such as a quantile (`notebooks/studies/quantile_zone.py`) varies to both sides. As many pairs as
+  there are are drawn with replacement, and the middle 95 % of the zones are the interval, corrected for their
+  bias so that the zone itself is the median (bootstrap, BC percentiles; Efron, J. Am. Stat. Assoc. 82, 1987).
 - An extreme does not: no resample has nearer people than the data, so all its zones lie on one side. The same
   holds for the hull of the data and the hull of all people there are. A hull's distance from its limit falls
   as n^-`RATE`. So the hulls of a share of the pairs, drawn without replacement, differ from the hull of all
