@@ -148,8 +148,13 @@ def test_the_numbers_of_the_page_are_those_of_the_tables():
 def test_the_five_results_are_those_of_the_tables():
     """Each number of the list is made anew from its table."""
     text = " ".join(README.split("## Five results")[1].split("\n## ")[0].split())
-    sizes = table("25_sizes").set_index("plazas").loc[1]
-    assert 100 * sizes["error_m"] < 4 and f"({sizes['encounters']:,.0f} enc" in text
+    blind = table("25_blind").set_index("crowd")
+    plazas, ignoring = blind.loc["default plazas"], blind[blind["held_a"].isna()]
+    held = f"in {plazas['held_a']:.0f} and {plazas['held_b']:.0f} of them"
+    assert f"On {plazas['crowds']} plazas" in text and held in text
+    assert f"({plazas['pairs']:,.0f} pairs each, median)" in text
+    usable = f"to anybody {ignoring['usable'].sum()} are called"
+    assert f"Of {ignoring['crowds'].sum()} crowds" in text and usable in text
 
     sites = table("06_sites").query("min_distance == 1 and kinds == 'strangers'")
     for site, words in (
