@@ -88,18 +88,27 @@ class SensorCheck:
         return self.resolved > 0
 
     def __str__(self) -> str:
-        low, high = _interval_of_share(self.exchanged, self.passes)
-        noise = (
-            "no error of positions was found"
-            if self.noise == 0
-            else f"a position errs by {100 * self.noise:.1f} cm ({100 * self.noise_low:.1f} to "
-            f"{100 * self.noise_high:.1f})"
-        )
-        return (
-            f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
-            f"of tracks have somebody within {NEAR_END:g} m, and {self.samples_near:.1%} of all samples; "
-            f"{noise}; {self.exchanged:,} of {self.passes:,} pairs who pass within {NEAR_END:g} m "
-            f"({low:.0%} to {high:.0%}) look exchanged"
+        ends = noise = passes = ""
+        if self.ends:
+            ends = (
+                f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
+                f"of tracks have somebody within {NEAR_END:g} m, and {self.samples_near:.1%} of all samples"
+            )
+        if self.noise:
+            low, high = 100 * self.noise_low, 100 * self.noise_high
+            noise = f"a position errs by {100 * self.noise:.1f} cm ({low:.1f} to {high:.1f})"
+        if self.passes:
+            low, high = _interval_of_share(self.exchanged, self.passes)
+            passes = (
+                f"{self.exchanged:,} of {self.passes:,} pairs who pass within {NEAR_END:g} m "
+                f"({low:.0%} to {high:.0%}) look exchanged"
+            )
+        return "; ".join(
+            [
+                ends or "no track ends inside the area",
+                noise or "no error of positions was found",
+                passes or f"no two people pass within {NEAR_END:g} m",
+            ]
         )
 
 
