@@ -126,8 +126,7 @@ def find_pairs(
 def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
     """How many pairs of `tracks` in an `area` are compared with chance, and what they say of the sensor."""
     crowd = Crowd.from_tracks(tracks, area)
-    met = crowd.meet(np.zeros(len(crowd.streams), np.int64), CLOSE)
-    n = int(np.isin(met.kind, [KINDS.index(kind) for kind in COMPARED]).sum())
+    n = int(np.isin(crowd.close.kind, [KINDS.index(kind) for kind in COMPARED]).sum())
     resolved = crowd.sensor.resolved
     loses = f"loses people who are nearer than {resolved:.1f} m to each other"
     return (
@@ -243,10 +242,14 @@ class Crowd:
         return np.repeat(np.arange(len(self.days[0])), _SECTORS)
 
     @cached_property
+    def close(self) -> Meetings:
+        """The pairs of people within `CLOSE`, as they walked."""
+        return self.meet(np.zeros(len(self.streams), np.int64), CLOSE)
+
+    @cached_property
     def sensor(self) -> SensorCheck:
         """What the tracks say about the sensor."""
-        still = np.zeros(len(self.streams), np.int64)
-        met = self.meet(still, CLOSE)
+        met = self.close
         one, other, _ = self.sample(met, np.flatnonzero(met.kind > 0), CLOSE)
         found = count_ends(self.rows, self.inside, one, other)
         found |= measure_noise(self.rows, self.inside)

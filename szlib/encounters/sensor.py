@@ -39,9 +39,9 @@ _MOST_LAG = 20  # steps of the clock between two samples of the slowest sensor
 _BENT = 1e-6  # a path that bends by less is interpolated [m]
 _FEWEST_KNOTS = 10  # fourth differences of a person whose noise is measured
 _FOURTH = np.array([1, -4, 6, -4, 1])
-BEFORE = (
-    12  # steps of the clock before and after a pass at which velocities are compared
-)
+BEFORE = 12
+"""Steps of the clock before and after a pass at which velocities are compared."""
+
 # Exchanged ids: the change of velocity of both people [m/s] that is more than a step aside, and the largest
 # share of it that is left if the ids are exchanged back.
 _TURNED, _LEFT_OVER = 1.0, 0.5

@@ -6,6 +6,7 @@ import io
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from ..core.files import folder_purpose, write_file
 from ..core.input_files import file_content, printable, read_json_object
 from ..encounters import days as several_days
 from ..encounters.areas import AUTO
+from ..encounters.finding import find_place
 from ..tracks import datasets
 from ..zones.outliers import R_MAX
 from ..zones.social_zone import FORMAT
@@ -37,6 +39,8 @@ from ..zones.verdict import describe_missing_encounters
 from .folders import require_place
 from .record.data_cache import find_null_model
 
+# The verdicts of a zone say what its warnings say; those of reading and of the area are shown.
+_verdict_only = partial(warnings.catch_warnings, action="ignore", category=DataWarning)
 SPEED = MPCSettings.zone_speed  # of the zone that is drawn and judged [m/s]
 NO_TRACKS = (
     "no null model: extracted days hold no tracks; add --tracks FILE... (those of one day are enough) to "
@@ -77,17 +81,15 @@ def fit(
     from matplotlib.figure import Figure
 
     file = _require_place(Path(out))
-    # the verdicts say what the warnings say
-    with warnings.catch_warnings(action="ignore", category=DataWarning):
-        if any(folder_purpose(path) == several_days.PURPOSE for path in paths):
-            samples, table, settings = _read_days(paths, tracks, exclude)
-            zone = _fit_lone_encounters(samples, table, settings, method, kind, jobs)
-        elif tracks or exclude:
-            raise DataError(
-                f"--tracks and --exclude belong to a folder of extracted days; {paths[0]} is none"
-            )
-        else:
-            zone, table = _fit_files(paths, settings, reading, method, kind, jobs)
+    if any(folder_purpose(path) == several_days.PURPOSE for path in paths):
+        samples, table, settings = _read_days(paths, tracks, exclude)
+        zone = _fit_lone_encounters(samples, table, settings, method, kind, jobs)
+    elif tracks or exclude:
+        raise DataError(
+            f"--tracks and --exclude belong to a folder of extracted days; {paths[0]} is none"
+        )
+    else:
+        zone, table = _fit_files(paths, settings, reading, method, kind, jobs)
     figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
     zone.plot(SPEED if SPEED in zone.ellipses else None, ax=figure.subplots())
     figure.savefig(content, format="png", dpi=150)
@@ -139,11 +141,14 @@ def _fit_files(
     """Fit a zone to files of tracks: ours to every pair of people, the others to lone encounters."""
     files = datasets.find(paths)
     area = several_days.known_area(settings, files, reading) or AUTO
-    table, settings = read_tracks(files, recipe=reading), replace(settings, area=area)
+    table = read_tracks(files, recipe=reading)
+    table, place = find_place(table, replace(settings, area=area))
+    settings = replace(settings, area=place)
     if method in (None, "respect"):
         options: Any = {"kinds": kind, "method": method, "progress": True}
         try:
-            return SocialZone.from_tracks(table, area=area, **options), table
+            with _verdict_only():
+                return SocialZone.from_tracks(table, area=place, **options), table
         except DataError as error:
             raise DataError(
                 f"{error}; the paper's zone of lone encounters may still be found: --method paper"
@@ -169,9 +174,10 @@ def _fit_lone_encounters(
     elif method == "respect":
         raise DataError(f"method respect needs a null model; {NO_TRACKS}")
     try:
-        return SocialZone.fit(
-            samples, method=method, null=null, n_resamples=N_RESAMPLES
-        )
+        with _verdict_only():
+            return SocialZone.fit(
+                samples, method=method, null=null, n_resamples=N_RESAMPLES
+            )
     except (ZoneError, DataError) as error:
         missing = describe_missing_encounters(
             {"encounters": samples["encounter"].nunique()}

@@ -56,6 +56,26 @@ def test_zone_from_tracks_is_that_of_the_library(
     assert (tmp_path / "zone.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.filterwarnings("always::szlib.DataWarning")
+@pytest.mark.parametrize("method", ["respect", "paper"])
+def test_rejected_rows_are_told_and_move_no_zone(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], method: str
+) -> None:
+    lines = recording.read_text().splitlines()
+    for k in range(50, len(lines), 100):  # one field is missing in 1 % of the rows
+        lines[k] = ",".join(lines[k].split(",")[:-1])
+    damaged = tmp_path / "atc-20121024.csv"
+    damaged.write_text("\n".join(lines) + "\n")
+    sizes = []
+    for file in (recording, damaged):
+        assert fit(file, "--out", tmp_path / "zone.json", "--method", method) == 0
+        ellipse = szlib.SocialZone.load(tmp_path / "zone.json").ellipses[1.1]
+        sizes.append([*ellipse.center, *ellipse.semi_axes])
+    rows = f"{len(range(50, len(lines), 100))} x missing or extra fields"
+    assert f"rejected rows: {rows}" in capsys.readouterr().err
+    assert sizes[1] == pytest.approx(sizes[0], abs=0.03)
+
+
 def test_columns_of_other_names_and_units_are_read(
     recording: Path, tmp_path: Path
 ) -> None:
