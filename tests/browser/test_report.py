@@ -34,7 +34,7 @@ def report(tmp_path_factory):
         {
             "encounter": np.arange(n),
             "los_angle": rng.uniform(-3.1, 3.1, n),
-            "speed": 1.1,
+            "speed": rng.uniform(0.5, 1.5, n),
         }
     )
     samples["distance"] = rng.uniform(0.9, 2.5, n)
