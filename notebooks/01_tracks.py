@@ -306,7 +306,7 @@ Markdown(
 
 # %% jupyter={"source_hidden": true}
 # Figure, and check
-(x0, x1), (y0, y1) = square.box.x, square.box.y
+(x0, x1), (y0, y1) = square.x, square.y
 cells = [np.arange(x0, x1 + 1e-9), np.arange(y0, y1 + 1e-9)]  # of 1 m
 seconds = np.histogram2d(people["x"], people["y"], bins=cells)[0].T / 10
 used = float((seconds > 0).mean())
@@ -315,7 +315,7 @@ shown = ax.pcolormesh(*cells, np.ma.masked_equal(seconds, 0), cmap="viridis", ra
 fig.colorbar(shown, ax=ax, label="person-seconds on the square metre")
 figures.label_metres(ax, f"People walk on {used:.0%} of the area's square metres")
 record.figure(fig, "open")
-if not area and isinstance(square, szlib.Square):
+if not area and square.is_rectangle:
     what = "the area is open: people walk in nine tenths of it"
     record.check(what, used >= 0.9, f"{used:.0%} of its square metres")
 record.key["area [m2]"] = round(square.area, 1)

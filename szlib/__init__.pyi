@@ -30,11 +30,11 @@ from .core.errors import (
 )
 from .encounters import (
     ATC_SQUARE,
+    Area,
     AttentionalSpace,
     EncounterSettings,
     Extraction,
     NullEncounters,
-    Region,
     Square,
     as_area,
     extract_days,
@@ -78,6 +78,7 @@ __all__ = [
     "MEETINGS",
     "MPCCBF",
     "SCENARIOS",
+    "Area",
     "AttentionalSpace",
     "DataError",
     "DataWarning",
@@ -94,7 +95,6 @@ __all__ = [
     "PlazaSettings",
     "Recipe",
     "ReferenceZone",
-    "Region",
     "RespectRadius",
     "RolloutSetup",
     "Scenario",

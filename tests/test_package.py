@@ -34,10 +34,10 @@ DRAWN = {
 """Methods that draw (`plot`, `animate`) import their figures when they are called; nothing else looks up."""
 
 PUBLIC = [
-    "ATC_SQUARE", "AttentionalSpace", "DataError", "DataWarning", "DifferentialDrive", "Ellipse",
+    "ATC_SQUARE", "Area", "AttentionalSpace", "DataError", "DataWarning", "DifferentialDrive", "Ellipse",
     "EncounterSettings", "Recipe",
     "Extraction", "MEETINGS", "MPCCBF", "MPCSettings", "NullEncounters", "NullTest",
-    "Person", "PlazaSettings", "ReferenceZone", "Region",
+    "Person", "PlazaSettings", "ReferenceZone",
     "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",
     "ZoneError", "as_area", "ellipse_distance", "extract_days",

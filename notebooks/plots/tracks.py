@@ -120,7 +120,7 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
     ax.add_patch(_outline_area(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
     add_legend_below(ax)
-    for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
+    for axis, edge, ends in zip("xy", edges, (area.x, area.y), strict=True):
         low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
         margin = 0.02 * (high - low)
         ax.set(**{f"{axis}lim": (low - margin, high + margin)})

@@ -61,7 +61,7 @@ def plaza() -> pd.DataFrame:
         return szlib.read_tracks(szlib.make_plaza(Path(folder) / "plaza.csv", seed=0))
 
 
-SITES: dict[str, tuple[Callable[[], pd.DataFrame], szlib.Square]] = {
+SITES: dict[str, tuple[Callable[[], pd.DataFrame], szlib.Area]] = {
     "plaza": (plaza, szlib.ATC_SQUARE),
     "ATC day": (lambda: szlib.read_tracks(sorted((DATA / "atc-1hz").glob("*.csv"))), szlib.ATC_SQUARE),
     "Grand Central": (
@@ -179,7 +179,7 @@ def less_crowded(name: str, tracks: pd.DataFrame) -> claims.Finding:
     return measure_density(tracks, SITES[name][1])
 
 
-def measure_density(tracks: pd.DataFrame, area: szlib.Square) -> claims.Finding:
+def measure_density(tracks: pd.DataFrame, area: szlib.Area) -> claims.Finding:
     """Doublings from the density of people in the `area` to that in the other space walked on.
 
     Both are people per square metre, counted on cells of 1 m.  The effect is the mean over the hours of the

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from szlib.core.errors import DataError
-from szlib.encounters.geometry import ATC_SQUARE, Square
+from szlib.encounters.geometry import ATC_SQUARE, Area
 from szlib.tracks import funnels
 from szlib.tracks.clock import TICKS_PER_SECOND, to_clock
 
@@ -25,7 +25,7 @@ def noninteracting_crowd(
     people: int = 1000,
     minutes: float = 60.0,
     bunch: int = 1,
-    square: Square = ATC_SQUARE,
+    square: Area = ATC_SQUARE,
 ) -> pd.DataFrame:
     """People who cross the square on straight paths, with random times, paths and speeds.
 
@@ -73,7 +73,7 @@ def noninteracting_crowd(
     return to_clock(funnels.attach(rows, [stage]), max_gap=1.5 / TICKS_PER_SECOND)
 
 
-def _on_edge(square: Square, side: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _on_edge(square: Area, side: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Points on the sides (left, lower, right, upper) of a square, shape (n, 2) [m]."""
     (x0, x1), (y0, y1) = square.x, square.y
     x = np.select([side == 0, side == 2], [x0, x1], x0 + share * (x1 - x0))

@@ -109,7 +109,7 @@ def recompute_nobody(row: pd.Series) -> dict[str, object]:
 
 
 @cache
-def load(site: str) -> tuple[pd.DataFrame, szlib.Square, int]:
+def load(site: str) -> tuple[pd.DataFrame, szlib.Area, int]:
     """Tracks, square and number of shifts of a site."""
     if site == "plaza":
         with tempfile.TemporaryDirectory() as folder:

@@ -17,7 +17,7 @@ null_model       the same people, each moved in time: `time_shifted`, `null_enco
 from .areas import as_area, walked_area
 from .days import Extraction, extract_days
 from .finding import find_encounters
-from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
+from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Square
 from .kinds import KINDS, of_kind
 from .null_model import NullEncounters, null_encounters, null_pairs, time_shifted
 from .pairs import find_pairs
@@ -27,7 +27,7 @@ from .settings import EncounterSettings
 
 __all__ = [
     "ATC_SQUARE", "KINDS", "PAPER_SPACE", "SAMPLE_COLUMNS", "Area", "AttentionalSpace", "EncounterSettings",
-    "Extraction", "NullEncounters", "Region", "SensorCheck", "Square", "as_area",
+    "Extraction", "NullEncounters", "SensorCheck", "Square", "as_area",
     "extract_days", "find_encounters", "find_pairs", "null_encounters", "null_pairs", "of_kind",
     "time_shifted", "walked_area",
 ]  # fmt: skip

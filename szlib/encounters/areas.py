@@ -18,7 +18,7 @@ from ..core.errors import DataError, warn
 from ..core.input_files import printable, read_small, reading
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS
-from .geometry import PAPER_SPACE, Area, AttentionalSpace, Region, Square
+from .geometry import PAPER_SPACE, Area, AttentionalSpace, Square
 
 AUTO = "auto"  # stands for the area that `walked_area` finds
 EXPECTED = (
@@ -51,13 +51,9 @@ def as_area(area: object) -> Area:
 
     Parameters
     ----------
-    area : a `Square` or `Region`; a Shapely polygon; an object with a ``polygon`` (PedPy's ``WalkableArea``
+    area : an `Area`; a Shapely polygon; an object with a ``polygon`` (PedPy's ``WalkableArea``
         and ``MeasurementArea``); four numbers x0, x1, y0, y1; or text: these numbers, well-known text,
         GeoJSON, or the path of a file of one of these.  All in metres, in the frame of the tracks.
-
-    Returns
-    -------
-    A `Square` where the area is a rectangle along the axes, else a `Region`.
 
     Raises
     ------
@@ -67,31 +63,24 @@ def as_area(area: object) -> Area:
     --------
     >>> import szlib
     >>> szlib.as_area("0 12 0 8")
-    Square(x=(0.0, 12.0), y=(0.0, 8.0))
+    Area(x=(0.0, 12.0), y=(0.0, 8.0), area=96.0)
     >>> szlib.as_area("POLYGON ((0 0, 12 0, 12 8, 0 0))").area
     48.0
     """
-    if isinstance(area, Square | Region):
+    if isinstance(area, Area):
         return area
     if isinstance(area, Path) or (isinstance(area, str) and not _is_area(area)):
         return _from_file(Path(area))
     if isinstance(area, str):
-        text = area.strip()
-        if text[0] == "{":
-            return _from_geojson(text)
-        return (
-            Region(text).simplest()
-            if text[0].isalpha()
-            else _from_numbers(text.replace(",", " ").split())
-        )
+        return _from_text(area.strip())
     if hasattr(area, "polygon"):
         area = area.polygon
     if hasattr(area, "geom_type"):
-        return _from_shape(area)
+        return Area(area)
     if isinstance(area, list | tuple | np.ndarray):
         return _from_numbers(area)
     raise DataError(
-        f"{type(area).__name__} is no area; {EXPECTED}, a Square, a Shapely polygon or PedPy's"
+        f"{type(area).__name__} is no area; {EXPECTED}, an Area, a Shapely polygon or PedPy's"
     )
 
 
@@ -106,16 +95,12 @@ def area_for(
         return walked_area(tracks, space=space)
     groups = tracks.groupby(tracks["day"].astype(str).map(places))
     found = {name: walked_area(part, space=space) for name, part in groups}
-    shapes = [
-        a.polygon if isinstance(a, Region) else shapely.Polygon(*a.outlines)
-        for a in found.values()
-    ]
     reasons = "; ".join(
         f"{name or 'days'}: {each.reason}" for name, each in found.items()
     )
-    return replace(
-        _from_shape(shapely.union_all(shapes)),
-        reason=f"for each recording, side by side along x: {reasons}",
+    return Area(
+        shapely.union_all([each.polygon for each in found.values()]),
+        f"for each recording, side by side along x: {reasons}",
     )
 
 
@@ -220,8 +205,9 @@ def walked_area(
             (corner + part * np.stack([first, end])).round(6).T.tolist()
         )
         everywhere = f"on each cell of {width:g} m at least {_PEOPLE} people walked"
-        return Square(
-            (x0, x1), (y0, y1), f"the largest rectangle in which {everywhere}"
+        return replace(
+            Square((x0, x1), (y0, y1)),
+            reason=f"the largest rectangle in which {everywhere}",
         )
     outline = _outline(seen, corner, part, space)
     if outline.is_empty:
@@ -244,10 +230,7 @@ def walked_area(
         if is_sparse
         else "there is no large rectangle in which people walked"
     )
-    return replace(
-        _from_shape(outline),
-        reason=f"the outline of the place where people were seen, as {why}",
-    )
+    return Area(outline, f"the outline of the place where people were seen, as {why}")
 
 
 def _find_seen_parts(
@@ -358,7 +341,7 @@ def _is_area(text: str) -> bool:
     )
 
 
-def _from_numbers(numbers: Any) -> Square:
+def _from_numbers(numbers: Any) -> Area:
     try:
         x0, x1, y0, y1 = map(float, numbers)
     except (TypeError, ValueError) as error:
@@ -382,21 +365,19 @@ def _from_file(path: Path) -> Area:
         raise DataError(f"{printable(path)}: {error}") from error
 
 
-def _from_geojson(text: str) -> Area:
-    """All polygons of a GeoJSON geometry, feature or collection, in one."""
+def _from_text(text: str) -> Area:
+    """The area of four numbers, well-known text or GeoJSON: all polygons of a collection in one."""
+    if not re.match(r"[{MP]", text, re.IGNORECASE):
+        return _from_numbers(text.replace(",", " ").split())
+    is_json = text.startswith("{")
     try:
-        shape = shapely.from_geojson(text)
+        shape = shapely.from_geojson(text) if is_json else shapely.from_wkt(text)
     except shapely.errors.ShapelyError as error:
+        form = "GeoJSON" if is_json else "well-known text"
         raise DataError(
-            f"{printable(text[:40])!r}: is no GeoJSON ({error}); {EXPECTED}"
+            f"{printable(text[:40])!r}: is no {form} ({error}); {EXPECTED}"
         ) from error
     if shape.geom_type == "GeometryCollection":
         parts = shapely.get_parts(shape)
         shape = shapely.union_all(parts) if len(parts) != 1 else parts[0]
-    return _from_shape(shape)
-
-
-def _from_shape(shape: BaseGeometry) -> Area:
-    return Region(
-        shapely.to_wkt(shapely.force_2d(shape), rounding_precision=-1)
-    ).simplest()
+    return Area(shape)

@@ -40,7 +40,7 @@ from ..tracks.readers import find_day, find_format, name_recordings
 from ..tracks.recipe import Recipe, find_recipe
 from .areas import AUTO, area_for, as_area, has_calendar, place_apart
 from .finding import find_encounters
-from .geometry import Area, AttentionalSpace, Region, Square
+from .geometry import Area, AttentionalSpace
 from .near_rows import read_near_area
 from .samples import no_samples
 from .settings import EncounterSettings
@@ -131,7 +131,7 @@ def known_area(
     settings: EncounterSettings, files: Sequence[Path], recipe: Recipe
 ) -> Area | None:
     """The area of the `settings`, of the `recipe`, or of the mall's `files`; None where it must be found."""
-    if isinstance(settings.area, Square | Region):
+    if isinstance(settings.area, Area):
         return settings.area
     areas = {find_format(file, recipe).area for file in files}
     known = areas.pop() if settings.area is None and len(areas) == 1 else None

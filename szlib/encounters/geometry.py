@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
+from shapely import MultiPolygon, Polygon
 
 from ..core.checks import require
 from ..core.errors import DataError
@@ -15,139 +14,75 @@ from ..tracks.shapes import ATC_AREA
 
 
 @dataclass(frozen=True)
-class Square:
-    """An open rectangle along the axes of the world.
+class Area:
+    """Where encounters are searched: a polygon, or several, with or without holes (pillars).
+
+    Equal areas are equal and have one hash, whatever the order of their corners.  ``str(area)`` is text from
+    which `szlib.as_area` makes the same area: "x0 x1 y0 y1" of a rectangle along the axes, else well-known
+    text.
 
     Parameters
     ----------
-    x, y : extent along each axis, (lowest, highest) [m].
-    reason : why `szlib.walked_area` took it, a sentence; empty for a square that was given.
+    polygon : a Shapely polygon or multipolygon in metres.  `szlib.as_area` takes other forms.
+    reason : how `szlib.walked_area` found it, a sentence; empty for an area that was given.
 
     Raises
     ------
-    DataError : a value is not finite, or the lowest is not below the highest.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> square = szlib.Square(x=(0, 12), y=(0, 8))
-    >>> square.area
-    96
-    >>> square.grown(-1)
-    Square(x=(1, 11), y=(1, 7))
-    >>> szlib.ATC_SQUARE.area
-    198.0
-    """
-
-    x: tuple[float, float]
-    y: tuple[float, float]
-    reason: str = field(default="", compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        is_square = (
-            np.isfinite([*self.x, *self.y]).all()
-            and self.x[0] < self.x[1]
-            and self.y[0] < self.y[1]
-        )
-        require(
-            is_square,
-            "x and y of a square",
-            (self.x, self.y),
-            "finite, each (lowest, highest)",
-        )
-
-    def __str__(self) -> str:
-        return " ".join(repr(float(value)) for value in (*self.x, *self.y))
-
-    @property
-    def box(self) -> Square:
-        """The smallest rectangle around it: itself."""
-        return self
-
-    @property
-    def area(self) -> float:
-        """Its size [m2]."""
-        return (self.x[1] - self.x[0]) * (self.y[1] - self.y[0])
-
-    @property
-    def outlines(self) -> list[np.ndarray]:
-        """Its one border, closed, shape (5, 2) [m]."""
-        (x0, x1), (y0, y1) = self.x, self.y
-        return [np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)])]
-
-    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
-        return np.asarray(
-            (x >= self.x[0]) & (x <= self.x[1]) & (y >= self.y[0]) & (y <= self.y[1])
-        )
-
-    def covers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Whether each quadrilateral lies inside; `x`, `y` of its corners in order, each (4, n) [m]."""
-        return np.asarray(self.contains(x, y).all(axis=0))
-
-    def grown(self, margin: float) -> Square:
-        """The square with a `margin` [m] on each side; smaller where it is negative."""
-        (x0, x1), (y0, y1) = self.x, self.y
-        return Square((x0 - margin, x1 + margin), (y0 - margin, y1 + margin))
-
-
-@dataclass(frozen=True)
-class Region:
-    """An open area of any outline: a polygon, or several, with or without holes (pillars).
-
-    Parameters
-    ----------
-    wkt : the polygon in metres as well-known text, such as "POLYGON ((0 0, 12 0, 12 8, 0 0))".
-        `szlib.as_area` makes it from Shapely's polygons, PedPy's areas and files.
-    reason : as for a `Square`.
-
-    Raises
-    ------
-    DataError : the text is not a valid polygon.
+    DataError : the polygon is not valid, not finite, or has no inside.
 
     Examples
     --------
     >>> import numpy as np, szlib
-    >>> region = szlib.Region("POLYGON ((0 0, 12 0, 12 8, 0 0))")
-    >>> region.contains(np.array([8.0, 1.0]), np.array([1.0, 7.0]))
+    >>> area = szlib.as_area("POLYGON ((0 0, 12 0, 12 8, 0 0))")
+    >>> area
+    Area(x=(0.0, 12.0), y=(0.0, 8.0), area=48.0)
+    >>> area.contains(np.array([8.0, 1.0]), np.array([1.0, 7.0]))
     array([ True, False])
     """
 
-    wkt: str
-    reason: str = field(default="", compare=False, repr=False)
+    polygon: Polygon | MultiPolygon
+    reason: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        _ = self.polygon
-
-    def __str__(self) -> str:
-        return self.wkt
-
-    @cached_property
-    def polygon(self) -> BaseGeometry:
-        """The polygon as a Shapely geometry; raises DataError if it is not valid."""
-        try:
-            polygon = shapely.from_wkt(self.wkt)
-        except (shapely.errors.ShapelyError, TypeError) as error:
+        polygon, given = self.polygon, repr(str(self.polygon)[:80])
+        if not isinstance(polygon, Polygon | MultiPolygon) or polygon.is_empty:
             raise DataError(
-                f"{str(self.wkt)[:80]!r}: is no well-known text ({error})"
-            ) from error
-        if polygon.geom_type not in ("Polygon", "MultiPolygon") or polygon.is_empty:
-            raise DataError(
-                f"{self.wkt[:80]!r}: an area must be a polygon with an inside; got a {polygon.geom_type}"
+                f"{given}: an area must be a polygon with an inside; got a {type(polygon).__name__}"
             )
         if not (np.isfinite(polygon.bounds).all() and polygon.is_valid):
             raise DataError(
-                f"{self.wkt[:80]!r}: is no valid polygon ({shapely.is_valid_reason(polygon)}); its border "
+                f"{given}: is no valid polygon ({shapely.is_valid_reason(polygon)}); its border "
                 "must not cross itself (shapely.make_valid can repair it)"
             )
-        shapely.prepare(polygon)
-        return polygon
+        text = shapely.to_wkt(polygon, rounding_precision=-1, output_dimension=2)
+        shape = shapely.from_wkt(text)  # as it is written: digits are lost
+        if shape.equals(shape.envelope):
+            # 0 for -0, which has another hash
+            shape = shapely.box(*np.add(polygon.bounds, 0.0))
+        object.__setattr__(self, "polygon", shapely.normalize(shape))
+
+    def __str__(self) -> str:
+        if self.is_rectangle:
+            return " ".join(map(str, self.x + self.y))
+        return str(shapely.to_wkt(self.polygon, rounding_precision=-1))
+
+    def __repr__(self) -> str:
+        return f"Area(x={self.x}, y={self.y}, area={self.area})"
 
     @property
-    def box(self) -> Square:
-        """The smallest rectangle along the axes around it."""
-        x0, y0, x1, y1 = self.polygon.bounds
-        return Square((x0, x1), (y0, y1))
+    def is_rectangle(self) -> bool:
+        """Whether it is a rectangle along the axes."""
+        return bool(self.polygon.equals(self.polygon.envelope))
+
+    @property
+    def x(self) -> tuple[float, float]:
+        """Its extent along x, (lowest, highest) [m]."""
+        return self.polygon.bounds[0], self.polygon.bounds[2]
+
+    @property
+    def y(self) -> tuple[float, float]:
+        """Its extent along y, (lowest, highest) [m]."""
+        return self.polygon.bounds[1], self.polygon.bounds[3]
 
     @property
     def area(self) -> float:
@@ -157,11 +92,12 @@ class Region:
     @property
     def outlines(self) -> list[np.ndarray]:
         """Every border, outer and inner, closed, each (n, 2) [m]."""
-        rings = shapely.get_parts(shapely.get_rings(shapely.get_parts(self.polygon)))
+        rings = shapely.get_rings(shapely.get_parts(self.polygon))
         return [shapely.get_coordinates(ring) for ring in rings]
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
+        shapely.prepare(self.polygon)  # once; does nothing the next time
         return np.asarray(shapely.intersects_xy(self.polygon, x, y))
 
     def covers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -170,34 +106,40 @@ class Region:
         Where the area is not convex, four corners inside are not enough: a pillar can stand between them.
         """
         inside = np.asarray(self.contains(x, y).all(axis=0))
-        if not self.convex:
+        if not self.polygon.equals(self.polygon.convex_hull):
             at = np.flatnonzero(inside)
-            shapes = shapely.polygons(
-                np.stack([x[:, at], y[:, at]], axis=-1).transpose(1, 0, 2)
-            )
-            inside[at] = shapely.covers(self.polygon, shapes)
+            corners = np.stack([x[:, at].T, y[:, at].T], axis=-1)
+            inside[at] = shapely.covers(self.polygon, shapely.polygons(corners))
         return inside
 
-    @cached_property
-    def convex(self) -> bool:
-        """Whether the area is convex."""
-        return bool(self.polygon.equals(self.polygon.convex_hull))
-
-    def simplest(self) -> Area:
-        """The same area, as a `Square` where it is a rectangle along the axes."""
-        return (
-            self.box
-            if self.convex and self.polygon.equals(self.polygon.envelope)
-            else self
-        )
-
-    def grown(self, margin: float) -> Region:
+    def grown(self, margin: float) -> Area:
         """The area with a `margin` [m] on each side, corners kept; smaller where it is negative."""
-        return Region(self.polygon.buffer(margin, join_style="mitre").wkt)
+        return Area(self.polygon.buffer(margin, join_style="mitre"))
 
 
-Area = Square | Region
-"""Where encounters are searched."""
+def Square(x: tuple[float, float], y: tuple[float, float]) -> Area:
+    """Make an open rectangle along the axes of the world.
+
+    Parameters
+    ----------
+    x, y : extent along each axis, (lowest, highest) [m].
+
+    Raises
+    ------
+    DataError : a value is not finite, or the lowest is not below the highest.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> str(szlib.Square(x=(0, 12), y=(0, 8)).grown(-1))
+    '1.0 11.0 1.0 7.0'
+    >>> szlib.ATC_SQUARE.area
+    198.0
+    """
+    is_square = np.isfinite([*x, *y]).all() and x[0] < x[1] and y[0] < y[1]
+    require(is_square, "x and y of a square", (x, y), "finite, each (lowest, highest)")
+    return Area(shapely.box(x[0], y[0], x[1], y[1]))
+
 
 ATC_SQUARE = Square(*ATC_AREA)
 """The central square of the ATC mall (assumed; free of pillars, walls and queues on the real day)."""

@@ -50,7 +50,7 @@ from ..tracks.readers import (
     with_days,
 )
 from ..tracks.recipe import Recipe, find_recipe
-from .geometry import Area, Square
+from .geometry import Area
 from .kinds import REACH
 
 NUMBERS = ("t", "id", "x", "y")  # columns of a block: t [s], id, x, y [m]
@@ -114,7 +114,7 @@ def reach_in_cells(duration: float, max_gap: float) -> tuple[float, int, int]:
 
 
 def select_near(
-    blocks: Iterable[pl.DataFrame], square: Square, duration: float, max_gap: float
+    blocks: Iterable[pl.DataFrame], square: Area, duration: float, max_gap: float
 ) -> Iterator[pl.DataFrame]:
     """Yield the needed rows of `blocks` sorted by time; else raise UnsortedError.
 
@@ -141,14 +141,10 @@ def select_near(
     yield rest.select(NUMBERS)
 
 
-def _needed(
-    rows: pl.DataFrame, square: Square, before: int, after: int
-) -> pl.DataFrame:
+def _needed(rows: pl.DataFrame, square: Area, before: int, after: int) -> pl.DataFrame:
     """The `rows` in cells that are needed."""
-    (x0, x1), (y0, y1) = (
-        square.grown(_POSITION_ROUNDING).x,
-        square.grown(_POSITION_ROUNDING).y,
-    )
+    x0, y0 = square.x[0] - _POSITION_ROUNDING, square.y[0] - _POSITION_ROUNDING
+    x1, y1 = square.x[1] + _POSITION_ROUNDING, square.y[1] + _POSITION_ROUNDING
     x, y = pl.col("x"), pl.col("y")
     inner = {"a": x >= x0, "b": x <= x1, "c": y >= y0, "d": y <= y1}
     sides = rows.select("id", "cell", **inner)
@@ -199,7 +195,7 @@ def read_near_area(
         and is_streamed(path, recipe)
     ):
         with open_file(path, recipe) as (found, scan), suppress(UnsortedError):
-            square, blocks = area.grown(REACH).box, UsableBlocks(scan)
+            square, blocks = area.grown(REACH), UsableBlocks(scan)
             parts, n_near = [], 0
             for rows in select_near(blocks, square, duration, found.max_gap or 0.0):
                 parts.append(rows)

@@ -23,7 +23,7 @@ class EncounterSettings:
 
     Parameters
     ----------
-    area : where the attentional space must stay: a `Square`, a Shapely polygon, PedPy's ``WalkableArea``,
+    area : where the attentional space must stay: an `Area`, a Shapely polygon, PedPy's ``WalkableArea``,
         text or a file, as for `szlib.as_area`; or "auto", the `szlib.walked_area` of the tracks, and of each
         recording that has no calendar (these are placed side by side, as their `reason` says).  None
         stands for `ATC_SQUARE` where the tracks are files of the ATC mall, else for "auto".
@@ -45,7 +45,7 @@ class EncounterSettings:
     >>> import szlib
     >>> settings = szlib.EncounterSettings(area="0 12 0 8", min_speed=0.6)
     >>> settings.area
-    Square(x=(0.0, 12.0), y=(0.0, 8.0))
+    Area(x=(0.0, 12.0), y=(0.0, 8.0), area=96.0)
     >>> szlib.EncounterSettings(duration=0.25)
     Traceback (most recent call last):
     ...

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.checks import Array, require
 from ..core.errors import DataError, ZoneError
-from ..encounters.geometry import ATC_SQUARE, AttentionalSpace, Square
+from ..encounters.geometry import ATC_SQUARE, Area, AttentionalSpace
 from ..zones.ellipses import Ellipse, ellipse_reach
 from ..zones.outliers import R_MAX
 
@@ -59,12 +59,12 @@ class PlazaSettings:
     noise : standard deviation of each measured coordinate [m].
     short_gaps, long_gaps : shares of tracks with a gap of 0.1 to 0.4 s, and of 0.6 to 1 s, which ends a
         track.
-    area : where people meet [m].
+    area : where people meet, a rectangle along the axes [m].
     date : of the day, in Japan, "YYYY-MM-DD".
 
     Raises
     ------
-    DataError : a number is invalid, or the area is too small for an encounter.
+    DataError : a number is invalid, the area is no rectangle, or too small for an encounter.
     ZoneError : the zone does not contain its person, or reaches r_max = 2 m.
 
     Notes
@@ -107,7 +107,7 @@ class PlazaSettings:
     noise: float = 0.01
     short_gaps: float = 0.05
     long_gaps: float = 0.01
-    area: Square = ATC_SQUARE
+    area: Area = ATC_SQUARE
     date: str = "2000-01-02"
 
     def __post_init__(self) -> None:
@@ -122,6 +122,7 @@ class PlazaSettings:
                 f"{WINDOW} to {_LONGEST_TRACKED:g} s",
             ),
             "clearance": (0 <= self.clearance < np.inf, "at least 0 m"),
+            "area": (self.area.is_rectangle, "a rectangle along the axes"),
             "noise": (0 <= self.noise < np.inf, "at least 0 m"),
             "speeds": (
                 MIN_WALKING_SPEED <= low < high <= top < np.inf,

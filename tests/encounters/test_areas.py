@@ -21,7 +21,7 @@ from matplotlib.path import Path as Outline
 import szlib
 from szlib.encounters.areas import _largest_rectangle, area_for, place_apart
 from szlib.encounters.finding import find_encounters
-from szlib.encounters.geometry import Region, Square
+from szlib.encounters.geometry import Area, Square
 from szlib.encounters.null_model import null_encounters
 from szlib.workbook.record import DataCache
 
@@ -86,7 +86,8 @@ def test_all_forms_give_the_same_area(tmp_path: Path, name: str, form: str) -> N
     }
     area = szlib.as_area(given[form] if form in given else geojson(shape, form))
     assert area == szlib.as_area(shape)
-    assert isinstance(area, Square) == (name == "hall")
+    assert area.is_rectangle == (name == "hall")
+    assert hash(area) == hash(szlib.as_area(shape))
     assert area.area == pytest.approx(shape.area)
     file = tmp_path / "area of the hall.txt"
     file.write_text("\ufeff" + str(area) + "\n", encoding="utf-8")
@@ -184,7 +185,7 @@ def test_error_names_a_file_that_is_no_area(tmp_path: Path) -> None:
 def test_contains_agrees_with_matplotlib(name: str, angle: float) -> None:
     shape = turned(SHAPES[name], angle)
     area = szlib.as_area(shape)
-    x0, x1, y0, y1 = *area.box.x, *area.box.y
+    x0, x1, y0, y1 = *area.x, *area.y
     x, y = np.random.default_rng(0).uniform(
         [[x0 - 1], [y0 - 1]], [[x1 + 1], [y1 + 1]], (2, 20_000)
     )
@@ -196,7 +197,7 @@ def test_contains_agrees_with_matplotlib(name: str, angle: float) -> None:
 
 
 def test_border_is_inside() -> None:
-    square, polygon = szlib.ATC_SQUARE, Region(ATC_POLYGON.wkt)
+    polygon = szlib.ATC_SQUARE
     ticks = np.r_[
         -18.5,
         -10,
@@ -207,12 +208,13 @@ def test_border_is_inside() -> None:
         np.nan,
     ]
     x, y = np.meshgrid(ticks, ticks)
-    np.testing.assert_array_equal(polygon.contains(x, y), square.contains(x, y))
+    inside = (x >= -18.5) & (x <= -7.5) & (y >= -10) & (y <= 8)
+    np.testing.assert_array_equal(polygon.contains(x, y), inside)
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_covers_requires_every_point_inside(name: str) -> None:
-    area = Region(SHAPES[name].wkt)
+    area = Area(SHAPES[name])
     rng = np.random.default_rng(1)
     n, unit = 400, np.linspace(0, 1, 41)
     heading = rng.uniform(-np.pi, np.pi, n)
@@ -244,7 +246,7 @@ def test_square_given_as_polygon_gives_identical_encounters() -> None:
         tracks = make_crowd(seed)
         expected = find_encounters(tracks, square=szlib.ATC_SQUARE)
         forms = [
-            Region(ATC_POLYGON.wkt),
+            Area(ATC_POLYGON),
             ATC_POLYGON,
             pedpy.WalkableArea(ATC_POLYGON),
             "-18.5 -7.5 -10 8",
@@ -427,7 +429,7 @@ def test_walked_area_never_reaches_outside_where_people_can_be_seen(name: str) -
     reached = shapely.Polygon(found.outlines[0])
     assert view.buffer(0.15).covers(reached)
     assert reached.area > 0.6 * view.area
-    assert ("outline" in found.reason) == isinstance(found, Region)
+    assert ("outline" in found.reason) == (not found.is_rectangle)
 
 
 def test_walked_area_of_a_corridor_holds_its_encounters() -> None:

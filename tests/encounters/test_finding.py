@@ -15,7 +15,7 @@ from plots import reference_frame
 import szlib
 from szlib.encounters import occupants
 from szlib.encounters.finding import find_encounters
-from szlib.encounters.geometry import AttentionalSpace, Square, wrap_angle
+from szlib.encounters.geometry import Area, AttentionalSpace, Square, wrap_angle
 from szlib.encounters.samples import SAMPLE_COLUMNS
 from szlib.tracks import funnels
 
@@ -62,7 +62,7 @@ def in_frame(person: tuple, point: tuple) -> tuple[float, float]:
 def search(
     tracks: pd.DataFrame,
     *,
-    square: Square,
+    square: Area,
     space: AttentionalSpace = AHEAD,
     duration: float = 3.0,
     min_distance: float = 1.0,

@@ -50,7 +50,7 @@ def raw_days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 def test_streamed_encounters_equal_those_of_the_whole_day(
     raw_days: list[Path],
     monkeypatch: pytest.MonkeyPatch,
-    square: szlib.Square,
+    square: szlib.Area,
     duration: float,
     max_gap: float | None,
     rows_at_once: int,

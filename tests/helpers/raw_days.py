@@ -56,7 +56,7 @@ def encounters(raw: pd.DataFrame, **parameters: object) -> pd.DataFrame:
 
 
 def assert_streamed_as_whole(
-    path: Path, *, square: szlib.Square, duration: float, max_gap: float | None = None
+    path: Path, *, square: szlib.Area, duration: float, max_gap: float | None = None
 ) -> int:
     """Check that both ways agree to the last bit, and return the number of samples."""
     near = read_near_area(

@@ -45,7 +45,7 @@ def make_crowd(
     *,
     people: int = 14,
     seconds: int = 40,
-    square: szlib.Square = szlib.ATC_SQUARE,
+    square: szlib.Area = szlib.ATC_SQUARE,
 ) -> pd.DataFrame:
     """People who come and go, wander through the square, stop, and are sometimes out of sight.
 

@@ -441,6 +441,7 @@ def test_truth_is_linear_in_speed() -> None:
         {"intruder_speeds": (5.0, 6.0)},
         {"date": "02.01.2000"},
         {"area": szlib.Square(x=(0, 8), y=(0, 20))},
+        {"area": szlib.as_area("POLYGON ((0 0, 40 0, 0 40, 0 0))")},
     ],
 )
 def test_invalid_settings_are_refused(given: dict[str, object]) -> None:

@@ -97,7 +97,7 @@ def says_truth(row: dict[str, Any], truth: dict[str, float]) -> dict[str, bool]:
 
 
 def judge(
-    tracks: pd.DataFrame, *, lone: bool, area: szlib.Square = AREA
+    tracks: pd.DataFrame, *, lone: bool, area: szlib.Area = AREA
 ) -> dict[str, Any]:
     """Fit a zone to `tracks`, and describe its verdict and its intervals."""
     start = time.process_time()
