@@ -25,6 +25,7 @@ from studies.committed import study, write_table
 from studies.respect import stored
 
 import szlib
+from szlib.encounters.null_model import MINUTES
 from szlib.plaza import ANY_SPEED_INTRUDERS
 
 SPEED = 1.1
@@ -104,7 +105,7 @@ def find_both(case: tuple[int, float, float, float], seed: int) -> tuple[pd.Data
     with tempfile.TemporaryDirectory() as folder:
         plaza = szlib.make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=build(case))
         tracks = szlib.read_tracks(plaza)
-    minutes = (0.2, 3.0) if case[0] < 2000 else None
+    minutes = (0.2, 3.0) if case[0] < 2000 else MINUTES
     options = {"shifts": SHIFTS[case[0]], "minutes": minutes, "seed": seed, "progress": False}
     return szlib.find_encounters(tracks), szlib.null_encounters(tracks, **options)
 

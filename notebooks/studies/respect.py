@@ -198,15 +198,15 @@ def stored(asked: argparse.Namespace, name: str, find: Callable[[], Encounters])
 
 def data_and_null(site: str, asked: argparse.Namespace) -> Encounters:
     """Samples of a site and its null model, stored between studies."""
-    return stored(asked, site, partial(find_both, site, asked.jobs))
+    return stored(asked, site, partial(find_both, site))
 
 
 @cache
-def find_both(site: str, n_jobs: int = 1) -> Encounters:
+def find_both(site: str) -> Encounters:
     """Samples of a site and its null model."""
     tracks, square, shifts = load(site)
     samples = szlib.find_encounters(tracks, square=square)
-    null = szlib.null_encounters(tracks, shifts=shifts, square=square, n_jobs=n_jobs, progress=False)
+    null = szlib.null_encounters(tracks, shifts=shifts, square=square, progress=False)
     return samples, null
 
 
@@ -392,7 +392,7 @@ def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
         if change == "nothing":
             samples, null = data_and_null(site, asked)
         else:
-            find = partial(changed, asked.jobs, **CHANGES[change])
+            find = partial(changed, **CHANGES[change])
             samples, null = stored(asked, f"{site}, {change}", find)
         for name in PLAZA_KINDS if site == "plaza" else KINDS_OF:
             row = {"site": site, "change": change, "kinds": name, "shifts": null.shifts}
@@ -416,9 +416,7 @@ def recompute_changes(row: pd.Series) -> dict[str, float]:
     return describe_change(szlib.of_kind(samples, kinds), null.of_kind(kinds))
 
 
-def changed(
-    n_jobs: int, *, scale: float = 1.0, rate: float = GRAND_CENTRAL_RATE, **how: object
-) -> Encounters:
+def changed(*, scale: float = 1.0, rate: float = GRAND_CENTRAL_RATE, **how: object) -> Encounters:
     """Samples and null model of Grand Central with one thing changed."""
     tracks, square, _ = load("grand-central")
     if scale != 1 or rate != GRAND_CENTRAL_RATE:
@@ -431,9 +429,7 @@ def changed(
         tracks = to_clock(rows, max_gap=0.15)
     square = how.pop("square", square)
     samples = szlib.find_encounters(tracks, square=square)
-    return samples, szlib.null_encounters(
-        tracks, shifts=FEW, square=square, n_jobs=n_jobs, progress=False, **how
-    )
+    return samples, szlib.null_encounters(tracks, shifts=FEW, square=square, progress=False, **how)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ Every window is one encounter of 31 samples.  All rows are computed at once, in 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from .areas import AUTO, area_for, place_apart
 from .geometry import Area
 from .kinds import REACH, kinds_of_pairs, of_kind
 from .occupants import TrackRows, find_occupants, occupant_changes
-from .samples import sample_windows
+from .samples import sample_rows
 from .settings import EncounterSettings
 
 
@@ -76,26 +75,26 @@ def find_encounters(
     """
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     tracks, area = find_place(tracks, settings)
-    rows = TrackRows.from_tracks(tracks)
-    openings = _find_openings(rows, area, settings)
-    chosen, reasons = _find_windows(rows, openings, settings)
-    ref, other = openings.rows[chosen], openings.other[openings.rows[chosen]]
+    rows, steps = TrackRows.from_tracks(tracks), settings.steps
+    at_opening, throughout, other = _check_rows(rows, area, settings)
+    first, missed = _apply_conditions(np.arange(len(rows)), at_opening)
+    conditions = _check_windows(rows, first, other, steps, throughout)
+    chosen, rejected = _apply_conditions(np.arange(len(first)), conditions)
+    ref = first[chosen]
 
-    samples = sample_windows(tracks, rows.order, ref, other, settings.steps)
-    counts = area.grown(REACH).contains(rows.x, rows.y)
-    kind = kinds_of_pairs(rows.person[ref], rows.person[other], rows, counts)
-    samples["kind"] = kind.repeat(settings.steps + 1)
+    pairs = np.stack([ref, other[ref]])
+    windows = (pairs[..., None] + np.arange(steps + 1)).reshape(2, -1)
+    number = np.arange(len(ref)).repeat(steps + 1)
+    samples = sample_rows(tracks, rows, number, *windows)
+    counts = rows.within(area.grown(REACH))
+    samples["kind"] = kinds_of_pairs(rows.person[pairs], rows, counts)[number]
     samples.attrs |= {"area": str(area), "area_reason": area.reason}
-    n_rows, n_openings, opening = (
-        len(rows),
-        len(openings.rows),
-        "encounters: ticks that open a window",
-    )
     stages = [
-        funnels.stage(opening, n_rows, n_openings, openings.reasons),
-        funnels.stage("encounters: windows", n_openings, len(chosen), reasons),
+        ("encounters: ticks that open a window", len(rows), len(first), missed),
+        ("encounters: windows", len(first), len(chosen), rejected),
     ]
-    return of_kind(funnels.attach(samples, [*funnels.get(tracks), *stages]), kinds)
+    funnel = [*funnels.get(tracks), *(funnels.stage(*each) for each in stages)]
+    return of_kind(funnels.attach(samples, funnel), kinds)
 
 
 def find_place(
@@ -115,129 +114,89 @@ def find_place(
     return tracks, area_for(tracks, area, settings.space)
 
 
-@dataclass(frozen=True, eq=False)
-class _Openings:
-    """Ticks at which an encounter may open, and conditions at every row.
-
-    Attributes
-    ----------
-    rows : the ticks at which an encounter may open.
-    other : row of one person in the space of each row; -1 if the space is empty.
-    people : number of other people in the space of each row.
-    space_inside : whether the corners of the space are inside the area.
-    ready : whether they are, and the reference pedestrian is fast enough.
-    reasons : number of rejected ticks, by reason.
-    """
-
-    rows: np.ndarray
-    other: np.ndarray
-    people: np.ndarray
-    space_inside: np.ndarray
-    ready: np.ndarray
-    reasons: dict[str, int]
+Conditions = dict[str, np.ndarray]
+"""Whether each row, or window, meets a condition, by the reason for which it is rejected otherwise."""
 
 
-def _find_openings(
+def _check_rows(
     rows: TrackRows, area: Area, settings: EncounterSettings
-) -> _Openings:
-    """Find the ticks that meet the four conditions by themselves."""
-    inside = area.contains(rows.x, rows.y)
+) -> tuple[Conditions, Conditions, np.ndarray]:
+    """Check the four conditions at each row by itself.
+
+    Returns those that must hold at the opening of a window, those that must hold throughout, and the row of
+    one person in the space of each row (-1 if it is empty).
+    """
+    inside = rows.within(area)
     at = np.flatnonzero(inside)
-    cos, sin = np.cos(rows.heading[at]), np.sin(rows.heading[at])
-    ahead, side = settings.space.corners.T[..., None]
-    corners = (
-        rows.x[at] + ahead * cos - side * sin,
-        rows.y[at] + ahead * sin + side * cos,
-    )
-    space_inside = inside.copy()
-    space_inside[at] = settings.has_walls or area.covers(*corners)
-    ready = space_inside & (rows.speed >= settings.min_speed)
+    corners = settings.space.corners @ np.array([1, 1j])
+    corners = rows.place[at] + corners[:, None] * rows.ahead[at]
+    has_room = inside.copy()
+    has_room[at] = settings.has_walls or area.covers(corners.real, corners.imag)
+    ready = has_room & (rows.speed >= settings.min_speed)
     people, other = find_occupants(rows, at, ready, settings.space)
-    one, partner = people == 1, other[people == 1]
-    far = np.zeros(len(rows), bool)
-    distance = np.hypot(rows.x[partner] - rows.x[one], rows.y[partner] - rows.y[one])
-    far[one] = distance >= settings.min_distance
-    found, reasons = _apply_conditions(
-        np.arange(len(rows)),
-        [
-            ("not in the area", inside),
-            ("velocity unknown", np.isfinite(rows.speed)),
-            ("a corner of the space outside the area", space_inside),
-            (f"slower than {settings.min_speed} m/s", ready),
-            ("nobody in the space", people >= 1),
-            ("several people in the space", one),
-            (f"other person nearer than {settings.min_distance} m", far),
-        ],
-    )
-    return _Openings(found, other, people, space_inside, ready, reasons)
-
-
-def _find_windows(
-    rows: TrackRows, openings: _Openings, settings: EncounterSettings
-) -> tuple[np.ndarray, dict[str, int]]:
-    """Find the openings whose window meets the conditions throughout, and count the others by reason."""
-    steps, first, partner = settings.steps, openings.rows, openings.other[openings.rows]
-    last, partner_last = (
-        np.minimum(row + steps, len(rows) - 1) for row in (first, partner)
-    )
-    tracked = np.ones(len(first), bool)
-    for start, end in ((first, last), (partner, partner_last)):
-        tracked &= (rows.piece[end] == rows.piece[start]) & (
-            rows.tick[end] - rows.tick[start] == steps
-        )
-    one = openings.people == 1
-    third_person = occupant_changes(rows, openings.other, one) | (openings.people > 1)
-    conditions = [
-        ("a track ends within the window", tracked),
-        (
-            "a corner leaves the area within the window",
-            _holds_throughout(openings.space_inside, first, last),
-        ),
-        ("too slow within the window", _holds_throughout(openings.ready, first, last)),
-        (
-            "somebody else enters the space",
-            _holds_throughout(~third_person, first + 1, last),
-        ),
-    ]
+    one, nearest = people == 1, settings.min_distance
+    far = one & (rows.distance(np.arange(len(rows)), other) >= nearest)
+    at_opening = {
+        "not in the area": inside,
+        "velocity unknown": np.isfinite(rows.speed),
+        "a corner of the space outside the area": has_room,
+        f"slower than {settings.min_speed} m/s": ready,
+        "nobody in the space": people >= 1,
+        "several people in the space": one,
+        f"other person nearer than {nearest} m": far,
+    }
+    throughout = {
+        "a corner leaves the area within the window": has_room,
+        "too slow within the window": ready,
+        "somebody else enters the space": (people <= 1)
+        & ~occupant_changes(rows, other, one),
+    }
     if settings.throughout:
-        conditions.append(
-            ("the other person leaves the space", _holds_throughout(one, first, last))
-        )
-    valid = np.logical_and.reduce([condition for _, condition in conditions])
-    conditions.append(
-        ("overlaps an earlier window", _drop_overlaps(first, valid, steps))
-    )
-    return _apply_conditions(np.arange(len(first)), conditions)
+        throughout["the other person leaves the space"] = one
+    return at_opening, throughout, other
 
 
-def _holds_throughout(
-    condition: np.ndarray, first: np.ndarray, last: np.ndarray
-) -> np.ndarray:
-    """Whether the condition holds at every row from `first` to `last` (inclusive)."""
-    failures = np.r_[0, np.cumsum(~condition)]
-    return np.asarray(failures[last + 1] == failures[np.minimum(first, last + 1)])
+def _check_windows(
+    rows: TrackRows,
+    first: np.ndarray,
+    other: np.ndarray,
+    steps: int,
+    throughout: Conditions,
+) -> Conditions:
+    """Check the windows of so many `steps` that open at the rows `first`.
+
+    Both people are tracked, the conditions hold `throughout`, and no two windows of one person overlap.
+    """
+    last = np.minimum(first + steps, len(rows) - 1)
+    tracked = np.ones(len(first), bool)
+    for start in (first, other[first]):
+        end = np.minimum(start + steps, len(rows) - 1)
+        tracked &= rows.piece[end] == rows.piece[start]
+        tracked &= rows.tick[end] - rows.tick[start] == steps
+    found = {"a track ends within the window": tracked}
+    for reason, condition in throughout.items():
+        failures = np.cumsum(~condition)  # the opening itself was checked
+        found[reason] = failures[last] == failures[first]
+    valid = np.logical_and.reduce(list(found.values()))
+    return found | {"overlaps an earlier window": _drop_overlaps(first, valid, steps)}
 
 
 def _drop_overlaps(first: np.ndarray, valid: np.ndarray, steps: int) -> np.ndarray:
     """Which valid windows are taken: the earliest one, then the next that begins after its end, and so on."""
-    taken = np.zeros(len(first), bool)
-    candidates = np.flatnonzero(valid)
-    following = np.searchsorted(
-        first[candidates], first[candidates] + steps, side="right"
-    )
-    at = 0
-    while at < len(candidates):
-        taken[candidates[at]] = True
-        at = int(following[at])
+    taken, end = np.zeros(len(first), bool), -1
+    for window in np.flatnonzero(valid):
+        if first[window] > end:
+            taken[window] = True
+            end = first[window] + steps
     return taken
 
 
 def _apply_conditions(
-    rows: np.ndarray, conditions: list[tuple[str, np.ndarray]]
+    rows: np.ndarray, conditions: Conditions
 ) -> tuple[np.ndarray, dict[str, int]]:
     """The rows that meet all conditions, and how many rows each condition was the first to reject."""
     reasons: dict[str, int] = {}
-    for reason, condition in conditions:
+    for reason, condition in conditions.items():
         passing = rows[condition[rows]]
         reasons[reason] = len(rows) - len(passing)
         rows = passing

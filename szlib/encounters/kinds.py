@@ -26,6 +26,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ..core.errors import DataError
 from ..tracks import funnels
@@ -96,84 +97,67 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
 
 
 def find_near_pairs(rows: TrackRows, whole: np.ndarray, seconds: float) -> np.ndarray:
-    """Pairs of people who are within `NEAR` [m] at so many `seconds`, or more; their numbers (n, 2).
+    """Pairs of people who are within `NEAR` [m] at so many `seconds`, or more; their numbers (2, n).
 
     `whole` are those of the `rows` (indices, or a mask) that are at a whole second.
     """
-    found = find_neighbours(rows.x[whole], rows.y[whole], rows.moment[whole], NEAR)
-    near = np.concatenate([np.empty((2, 0), np.intp), *map(np.stack, found)], axis=1)
-    pairs = np.sort(rows.person[whole][near.T], axis=1)
-    pairs, counts = np.unique(pairs, axis=0, return_counts=True)
-    return np.asarray(pairs[counts >= seconds])
+    found = find_neighbours(rows.place[whole], rows.moment[whole], NEAR)
+    pairs = np.sort(rows.person[whole][np.concatenate(list(found), axis=1)], axis=0)
+    pairs, counts = np.unique(pairs, axis=1, return_counts=True)
+    return np.asarray(pairs[:, counts >= seconds])
 
 
 def kinds_of_pairs(
-    first: np.ndarray, second: np.ndarray, rows: TrackRows, counts: np.ndarray
+    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray
 ) -> pd.Categorical:
     """Decide the kinds of pairs of people from the `rows` that count (`counts`, one for each row).
 
-    `first` and `second` are the numbers of the two people of each pair, (n,).
+    `pairs` are the numbers of the two people of each pair, (2, n).
     """
-    pairs, index = np.unique(
-        np.sort(np.column_stack([first, second]), axis=1), axis=0, return_inverse=True
-    )
-    pair, a, b = _common_track(pairs, rows.person, rows.tick, counts)
-    apart = np.hypot(rows.x[a] - rows.x[b], rows.y[a] - rows.y[b])
-    relative = np.hypot(rows.vx[a] - rows.vx[b], rows.vy[a] - rows.vy[b])
-    ticks, near, equal = (
-        np.bincount(pair, each, minlength=len(pairs))
-        for each in (np.ones(len(pair)), apart <= NEAR, relative <= EQUAL_VELOCITY)
-    )
+    pair, both = _common_track(pairs, rows, counts)
+    is_near = rows.distance(*both) <= NEAR
+    is_equal = np.abs(np.diff(rows.velocity[both], axis=0)[0]) <= EQUAL_VELOCITY
+    n = pairs.shape[1]
+    ticks = np.bincount(pair, minlength=n)
     together = ticks >= TOGETHER * TICKS_PER_SECOND
-    together &= (near >= NEAR_SHARE * ticks) & (equal >= EQUAL_SHARE * ticks)
-    codes = classify_motion(rows, a, b, pair, len(pairs))
+    for condition, share in ((is_near, NEAR_SHARE), (is_equal, EQUAL_SHARE)):
+        together &= np.bincount(pair, condition, n) >= share * ticks
+    codes = classify_motion(rows, both, pair, n)
     codes = np.select([ticks == 0, together], [-1, KINDS.index(COMPANIONS)], codes)
-    return pd.Categorical(
-        np.array([*KINDS, None])[codes[index.ravel()]], categories=list(KINDS)
-    )
+    return name_kinds(codes)
+
+
+def name_kinds(codes: NDArray[np.integer]) -> pd.Categorical:
+    """The kinds with the numbers `codes`; none for -1."""
+    return pd.Categorical(np.array([*KINDS, None])[codes], categories=list(KINDS))
 
 
 def classify_motion(
-    rows: TrackRows, a: np.ndarray, b: np.ndarray, pair: np.ndarray, n: int
+    rows: TrackRows, both: np.ndarray, pair: np.ndarray, n: int
 ) -> np.ndarray:
     """Decide how the two people of each of `n` pairs move: numbers of `KINDS`, companions left aside.
 
-    `a` and `b` are the `rows` of the two at every moment that counts, and `pair` the number of their pair.
+    `both` are the `rows` of the two at every moment that counts, (2, m), and `pair` the number of their pair.
     """
-    (ax, ay), (bx, by) = (
-        np.nan_to_num([rows.vx[each], rows.vy[each]]) for each in (a, b)
-    )
-
-    def over_time(values: np.ndarray) -> np.ndarray:
-        """Sum of the `values` of each pair."""
-        return np.bincount(pair, weights=values, minlength=n)
-
-    slow = np.maximum(*(over_time(rows.speed[each] < WALKING) for each in (a, b)))
-    stands = slow > over_time(np.ones(len(pair))) / 2
-    angle = np.abs(
-        np.arctan2(over_time(ax * by - ay * bx), over_time(ax * bx + ay * by))
-    )
+    slow = [np.bincount(pair, rows.speed[each] < WALKING, n) for each in both]
+    stands = np.maximum(*slow) > np.bincount(pair, minlength=n) / 2
+    # The angle of this product is that between the directions of motion.
+    turn = np.nan_to_num(rows.velocity[both[0]].conj() * rows.velocity[both[1]])
+    along, across = (np.bincount(pair, part, n) for part in (turn.real, turn.imag))
+    angle = np.abs(np.arctan2(across, along))
     found = [KINDS.index(kind) for kind in (STANDING, SAME, OPPOSITE, CROSSING)]
     rules = [stands, angle <= ALONG, angle >= np.pi - ALONG]
     return np.select(rules, found[:3], found[3]).astype(np.int8)
 
 
 def _common_track(
-    pairs: np.ndarray, person: np.ndarray, tick: np.ndarray, counts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Every tick at which the rows of both people of a pair count: the pair's number, and the two rows."""
-    in_pair = np.zeros(person[-1] + 1, bool)
-    in_pair[pairs] = True
-    rows = np.flatnonzero(counts & in_pair[person])
-    if len(rows) == 0:
-        return rows, rows, rows
-    start = np.searchsorted(person[rows], pairs[:, 0])
-    count = np.searchsorted(person[rows], pairs[:, 0], side="right") - start
-    pair = np.repeat(np.arange(len(pairs)), count)
-    a = np.repeat(start - np.cumsum(count) + count, count) + np.arange(count.sum())
-    first, span = tick[rows].min(), int(np.ptp(tick[rows])) + 1
-    moment = person[rows] * span + tick[rows] - first  # sorted, as rows are
-    sought = pairs[pair, 1] * span + tick[rows[a]] - first
-    b = np.minimum(np.searchsorted(moment, sought), len(rows) - 1)
-    both = moment[b] == sought
-    return pair[both], rows[a[both]], rows[b[both]]
+    row = np.flatnonzero(counts & np.isin(rows.person, pairs))
+    a = pd.DataFrame({"one": rows.person[row], "tick": rows.tick[row], "a": row})
+    b = a.rename(columns={"one": "other", "a": "b"})
+    both = pd.DataFrame(pairs.T, columns=["one", "other"]).reset_index(names="pair")
+    both = both.merge(a, on="one").merge(b, on=["other", "tick"])
+    both = both.sort_values(["pair", "tick"])
+    return both["pair"].to_numpy(), both[["a", "b"]].to_numpy().T

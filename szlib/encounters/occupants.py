@@ -4,49 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 
-from ..tracks.clock import clock_index
-from .geometry import AttentionalSpace
+from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, clock_index
+from .geometry import Area, AttentionalSpace
 
-_AT_ONCE = 2_000_000  # pairs of rows held in memory at a time
+_AT_ONCE = 500_000  # rows searched at a time
 
 
 def find_neighbours(
-    x: np.ndarray, y: np.ndarray, moment: np.ndarray, reach: float
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    place: np.ndarray, moment: np.ndarray, reach: float
+) -> Iterator[np.ndarray]:
     """Yield blocks of pairs of rows at one moment that are at most `reach` [m] apart, each pair once.
-
-    Only rows in the same or neighbouring cells of this width are compared.
 
     Parameters
     ----------
-    x, y : positions, shape (n,) [m].
-    moment : number of the moment of each row, at least 0, shape (n,).
+    place : positions x + iy, shape (n,) [m].
+    moment : number of the moment of each row, shape (n,).
     reach : largest distance [m].
+
+    Yields
+    ------
+    The rows of the two people of each pair, shape (2, n).
     """
-    if len(x) == 0:
-        return
-    ix, iy = (((v - v.min()) // reach).astype(np.int64) for v in (x, y))
-    ny, nx = int(iy.max()) + 3, int(ix.max()) + 2
-    key = (moment * np.int64(nx) + ix) * ny + iy
-    order = np.argsort(key)
-    key, x, y, row = key[order], x[order], y[order], np.arange(len(key))
-    first, end = (key, key + ny - 1), (key + 1, key + ny + 1)
-    for low_key, high_key in zip(first, end, strict=True):
-        low = np.maximum(np.searchsorted(key, low_key), row + 1)
-        high = np.searchsorted(key, high_key, side="right")
-        count = np.maximum(high - low, 0)
-        ends = np.cumsum(count)
-        cuts = np.searchsorted(ends, np.arange(_AT_ONCE, ends[-1], _AT_ONCE))
-        for start, end in zip(np.r_[0, cuts], np.r_[cuts, len(key)], strict=True):
-            n = count[start:end]
-            one = np.repeat(row[start:end], n)
-            other = np.arange(n.sum()) - np.repeat(np.cumsum(n) - n, n) + low[one]
-            near = np.hypot(x[one] - x[other], y[one] - y[other]) <= reach
-            yield order[one[near]], order[other[near]]
+    order = np.argsort(moment, kind="stable")
+    # A block begins where a moment does.
+    cuts = np.searchsorted(moment[order], moment[order][::_AT_ONCE])
+    for rows in np.split(order, np.unique(cuts)[1:]):
+        # Two moments are farther apart than the reach, along a third axis.
+        since = 2 * reach * (moment[rows] - moment[rows].min(initial=0))
+        points = np.column_stack([place[rows].real, place[rows].imag, since])
+        tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
+        yield rows[tree.query_pairs(reach, output_type="ndarray").T]
 
 
 _ROUNDING = 1e-3  # larger than every rounding error of a position [m]
@@ -61,9 +54,8 @@ class TrackRows:
     order : position of each row in the table.
     tick, piece : number of the tick and of the gap-free piece, as from `clock_index`.
     day, person : number of the day and of the person, each from 0.
-    x, y : position [m].
-    vx, vy : velocity [m/s], NaN where unknown.
-    speed, heading : magnitude [m/s] and direction [rad] of the velocity.
+    place : position x + iy [m].
+    velocity : vx + i vy [m/s], NaN where unknown.
     """
 
     order: np.ndarray
@@ -71,47 +63,53 @@ class TrackRows:
     piece: np.ndarray
     day: np.ndarray
     person: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    vx: np.ndarray
-    vy: np.ndarray
-    speed: np.ndarray
-    heading: np.ndarray
+    place: np.ndarray
+    velocity: np.ndarray
 
     @classmethod
     def from_tracks(cls, tracks: pd.DataFrame) -> TrackRows:
         """The rows of the table `tracks`.  Raises DataError as `clock_index`."""
         order, tick, piece = clock_index(tracks)
-        x, y, vx, vy = (
-            tracks[name].to_numpy(float)[order] for name in ("x", "y", "vx", "vy")
-        )
-        day, ids = (
-            pd.factorize(tracks["day"], sort=True)[0][order],
-            tracks["id"].to_numpy()[order],
-        )
+        day = pd.factorize(tracks["day"], sort=True)[0][order]
+        ids = tracks["id"].to_numpy()[order]
         person = np.cumsum(np.r_[False, (np.diff(day) != 0) | (ids[1:] != ids[:-1])])
-        return cls(
-            order,
-            tick,
-            piece,
-            day,
-            person,
-            x,
-            y,
-            vx,
-            vy,
-            np.hypot(vx, vy),
-            np.arctan2(vy, vx),
-        )
+        x, y, vx, vy = (tracks[name].to_numpy(float)[order] for name in COLUMNS[3:])
+        return cls(order, tick, piece, day, person, x + 1j * y, vx + 1j * vy)
 
-    @property
+    @cached_property
+    def recorded(self) -> tuple[np.ndarray, np.ndarray]:
+        """First second of each day, and the seconds of a circle that holds its recording."""
+        second = self.tick // TICKS_PER_SECOND
+        begins = np.flatnonzero(np.diff(self.day, prepend=-1))
+        first = np.minimum.reduceat(second, begins)
+        return first, np.maximum.reduceat(second, begins) - first + 2
+
+    @cached_property
+    def speed(self) -> np.ndarray:
+        """Magnitude of the velocity [m/s]."""
+        return np.asarray(np.abs(self.velocity))
+
+    @cached_property
+    def ahead(self) -> np.ndarray:
+        """Direction of the velocity, a complex number of length 1."""
+        return np.asarray(np.exp(1j * np.angle(self.velocity)))
+
+    @cached_property
     def moment(self) -> np.ndarray:
         """Number of the moment, a tick of a day, of each row."""
-        tick = self.tick - self.tick.min()
-        return np.asarray(self.day * (np.int64(tick.max()) + 1) + tick)
+        tick = self.tick - self.tick.min(initial=0)
+        return np.asarray(self.day * (np.int64(tick.max(initial=0)) + 1) + tick)
 
     def __len__(self) -> int:
-        return len(self.x)
+        return len(self.tick)
+
+    def within(self, area: Area) -> np.ndarray:
+        """Whether each row is in the `area`."""
+        return area.contains(self.place.real, self.place.imag)
+
+    def distance(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Distance between the positions of rows `one` and `other` [m]."""
+        return np.asarray(np.abs(self.place[other] - self.place[one]))
 
     def select(self, rows: np.ndarray) -> TrackRows:
         """Some of these `rows` (a mask or indices), with the numbers of their people and pieces."""
@@ -126,22 +124,18 @@ def find_occupants(
     Only rows that are `ready` (booleans) have a space.  The space lies inside the area, so only the rows
     `inside` the area (their indices) can be in it.
     """
-    found = [(np.empty(0, np.intp),) * 2]
-    cosines, sines = np.cos(rows.heading), np.sin(rows.heading)
+    people, other = np.zeros(len(rows), np.intp), np.full(len(rows), -1)
     reach = float(np.hypot(*space.corners.T).max()) + _ROUNDING
-    places = rows.x[inside], rows.y[inside], rows.moment[inside]
-    for pair in find_neighbours(*places, reach):
-        for ref, oth in (pair, pair[::-1]):
-            looks = ready[inside[ref]]
-            ref, oth = inside[ref[looks]], inside[oth[looks]]
-            dx, dy = rows.x[oth] - rows.x[ref], rows.y[oth] - rows.y[ref]
-            cos, sin = cosines[ref], sines[ref]
-            within = space.contains(cos * dx + sin * dy, cos * dy - sin * dx)
-            found.append((ref[within], oth[within]))
-    ref, oth = map(np.concatenate, zip(*found, strict=True))
-    other = np.full(len(rows), -1)
-    other[ref] = oth
-    return np.bincount(ref, minlength=len(rows)), other
+    for pairs in find_neighbours(rows.place[inside], rows.moment[inside], reach):
+        ref, oth = inside[np.concatenate([pairs, pairs[::-1]], axis=1)]
+        ref, oth = ref[ready[ref]], oth[ready[ref]]
+        seen, ahead = rows.place[oth] - rows.place[ref], rows.ahead[ref]
+        x = ahead.real * seen.real + ahead.imag * seen.imag
+        y = ahead.real * seen.imag - ahead.imag * seen.real
+        within = space.contains(x, y)
+        people += np.bincount(ref[within], minlength=len(rows))
+        other[ref[within]] = oth[within]
+    return people, other
 
 
 def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.ndarray:
@@ -152,7 +146,5 @@ def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.
     row = np.flatnonzero(one)
     person = rows.person[other[row]]
     changed = np.zeros(len(other), bool)
-    changed[row[1:]] = (rows.piece[row[1:]] == rows.piece[row[:-1]]) & (
-        person[1:] != person[:-1]
-    )
+    changed[row[1:]] = (np.diff(rows.piece[row]) == 0) & (np.diff(person) != 0)
     return changed

@@ -19,9 +19,11 @@ within 0.6 m is found; of the 500 passes of crowds that walk straight on, or swe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import beta, binom
 
@@ -30,7 +32,9 @@ from .occupants import TrackRows
 NEAR_END = 0.6
 """Distance at which somebody is near the end of a track, or passes close by [m]."""
 
-_EDGES = np.arange(0.2, 1.25, 0.1)  # of the distances at which ends are counted [m]
+_EDGES = np.r_[
+    0, np.arange(0.2, 1.25, 0.1)
+]  # of the distances at which ends are counted [m]
 # A sound tracker has at most so many times as many ends as samples at a distance.
 _MOST = 2.0
 _FEWEST = 5  # ends that say something
@@ -38,7 +42,7 @@ _SMALL = 0.005  # level at which a distance counts as not resolved
 _MOST_LAG = 20  # steps of the clock between two samples of the slowest sensor
 _BENT = 1e-6  # a path that bends by less is interpolated [m]
 _FEWEST_KNOTS = 10  # fourth differences of a person whose noise is measured
-_FOURTH = np.array([1, -4, 6, -4, 1])
+_SECOND, _FOURTH = np.array([1, -2, 1]), np.array([1, -4, 6, -4, 1])
 BEFORE = 12
 """Steps of the clock before and after a pass at which velocities are compared."""
 
@@ -123,17 +127,19 @@ def count_ends(
     inside : whether each of them is in the area.
     one, other : rows of two strangers at one moment who are near each other, shape (n,).
     """
-    is_end = _find_ends(rows, inside)
-    distance = np.hypot(rows.x[one] - rows.x[other], rows.y[one] - rows.y[other])
-    nearest = np.full(len(rows), np.inf)
+    breaks = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
+    recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
+    is_end = (np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded
+    nearest, distance = np.full(len(rows), np.inf), rows.distance(one, other)
     np.minimum.at(nearest, one, distance)
     np.minimum.at(nearest, other, distance)
     ends, samples = nearest[is_end], nearest[inside]
     resolved, n = 0.0, len(ends)
-    for low, high in zip(np.r_[0, _EDGES[:-1]], _EDGES, strict=True):
-        k = int(((ends >= low) & (ends < high)).sum())
-        expected = _share((samples >= low) & (samples < high))
-        if k >= _FEWEST and beta.ppf(_SMALL, k, n - k + 1) > _MOST * expected:
+    for low, high in pairwise(_EDGES):
+        near, expected = ((low <= d) & (d < high) for d in (ends, samples))
+        k = int(near.sum())
+        least = beta.ppf(_SMALL, k, n - k + 1) if k >= _FEWEST else 0.0
+        if least > _MOST * _share(expected):
             resolved = float(high)
     low, high = _interval_of_share(int((ends < NEAR_END).sum()), n)
     return {
@@ -147,38 +153,41 @@ def count_ends(
     }
 
 
-def _find_ends(rows: TrackRows, inside: np.ndarray) -> NDArray[np.bool_]:
-    """Whether a track begins or ends at each row inside the area, but for those cut by the recording."""
-    breaks = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
-    recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
-    return np.asarray((np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded)
-
-
 def measure_noise(rows: TrackRows, inside: np.ndarray) -> dict[str, Any]:
     """Measure the error of positions: the fields of `SensorCheck` that begin with noise.
 
     `rows` and `inside` are as in `count_ends`.
     """
-    at = np.arange(1, len(rows) - 1)
-    at = at[rows.piece[at - 1] == rows.piece[at + 1]]
-    bends = [v[at - 1] - 2 * v[at] + v[at + 1] for v in (rows.x, rows.y)]
-    is_bent = np.hypot(*bends) > _BENT
-    lag = int(np.clip(np.rint(1 / max(_share(is_bent), 1e-9)), 1, _MOST_LAG))
-    at = at[is_bent]
-    at = at[(at >= 2 * lag) & (at < len(rows) - 2 * lag)]
-    at = at[(rows.piece[at - 2 * lag] == rows.piece[at + 2 * lag]) & inside[at]]
-    steps = zip(_FOURTH, lag * np.arange(-2, 3), strict=True)
-    weighted = [(weight, at + step) for weight, step in steps]
-    fourth = [sum(w * v[row] for w, row in weighted) for v in (rows.x, rows.y)]
-    variance = (fourth[0] ** 2 + fourth[1] ** 2) / (2 * (_FOURTH**2).sum())
-    knots = np.bincount(rows.person[at])
-    of_person = np.bincount(rows.person[at], variance)[knots >= _FEWEST_KNOTS]
-    errors = np.sort(np.sqrt(of_person / knots[knots >= _FEWEST_KNOTS]))
+    at = _same_piece(rows, np.arange(len(rows)), 1)
+    bends = np.abs(_differences(rows, at, 1, _SECOND)) > _BENT
+    lag = int(np.clip(np.rint(1 / max(_share(bends), 1e-9)), 1, _MOST_LAG))
+    at = _same_piece(rows, at[bends], 2 * lag)
+    at = at[inside[at]]
+    variance = (
+        np.abs(_differences(rows, at, lag, _FOURTH)) ** 2 / (_FOURTH**2).sum() / 2
+    )
+    of_person = pd.Series(variance).groupby(rows.person[at]).agg(["mean", "size"])
+    is_measured = of_person["size"] >= _FEWEST_KNOTS
+    errors = np.sort(np.sqrt(of_person["mean"][is_measured]))
     if len(errors) <= _FEWEST:
         return {}
     ends = binom.ppf([0.025, 0.975], len(errors), 0.5).astype(int)
     low, high = errors[np.clip(ends - np.array([1, 0]), 0, len(errors) - 1)].tolist()
     return {"noise": float(np.median(errors)), "noise_low": low, "noise_high": high}
+
+
+def _same_piece(rows: TrackRows, at: np.ndarray, reach: int) -> np.ndarray:
+    """Those rows `at` whose piece of track goes on for `reach` steps before and after them."""
+    at = at[(at >= reach) & (at < len(rows) - reach)]
+    return np.asarray(at[rows.piece[at - reach] == rows.piece[at + reach]])
+
+
+def _differences(
+    rows: TrackRows, at: np.ndarray, lag: int, weights: np.ndarray
+) -> np.ndarray:
+    """Differences of positions around the rows `at`, `lag` steps apart, with these `weights`."""
+    steps = lag * (np.arange(len(weights)) - len(weights) // 2)
+    return np.asarray(rows.place[at[:, None] + steps] @ weights)
 
 
 def is_exchanged(
@@ -188,8 +197,7 @@ def is_exchanged(
 
     `before` and `after` are the numbers of their `rows` before and after they pass, each (n, 2).
     """
-    velocity = rows.vx + 1j * rows.vy
-    was, goes = velocity[before], velocity[after]
+    was, goes = rows.velocity[before], rows.velocity[after]
     own, exchanged = (np.abs(goes - each).sum(axis=1) for each in (was, was[:, ::-1]))
     return np.asarray((own > _TURNED) & (exchanged < _LEFT_OVER * own))
 

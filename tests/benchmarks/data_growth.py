@@ -89,7 +89,7 @@ def bench_encounters() -> dict[str, float]:
 def shifted(tracks: pd.DataFrame, shifts: int) -> szlib.NullEncounters:
     """A null model, found in this process; by minutes that a short plaza allows."""
     return szlib.null_encounters(
-        tracks, shifts=shifts, minutes=(0.5, 2.0), n_jobs=1, progress=False
+        tracks, shifts=shifts, minutes=(0.5, 2.0), progress=False
     )
 
 

@@ -64,16 +64,6 @@ def test_encounter_numbers_are_unique_and_the_funnel_adds_up(
     json.dumps(null.parameters)
 
 
-def test_result_does_not_depend_on_processes(
-    tracks: pd.DataFrame, null: szlib.NullEncounters
-) -> None:
-    other = szlib.null_encounters(
-        tracks, shifts=7, seed=4, n_jobs=2, progress=False, **ASKED
-    )
-    pd.testing.assert_frame_equal(other.samples, null.samples)
-    pd.testing.assert_frame_equal(other.encounters, null.encounters)
-
-
 def test_first_shifts_do_not_depend_on_their_number(
     tracks: pd.DataFrame, null: szlib.NullEncounters
 ) -> None:
@@ -116,8 +106,6 @@ def test_invalid_arguments_raise(
 ) -> None:
     with pytest.raises(DataError, match="shifts must be at least 1"):
         szlib.null_encounters(tracks, shifts=0)
-    with pytest.raises(DataError, match="too short"):
-        szlib.null_encounters(tracks, progress=False, minutes=(1, 30))
     with pytest.raises(DataError, match="from 0 to 6; got 7"):
         null.one(7)
     with pytest.raises(DataError, match=r"unknown parameter \['min_distanse'"):

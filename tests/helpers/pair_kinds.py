@@ -25,5 +25,5 @@ def encounter_kinds(
     )
     counts = np.ones(len(rows), bool)
     if area is not None:
-        counts = as_area(area).grown(REACH).contains(rows.x, rows.y)
-    return kinds_of_pairs(ref, other, rows, counts)
+        counts = rows.within(as_area(area).grown(REACH))
+    return kinds_of_pairs(np.stack([ref, other]), rows, counts)
