@@ -8,7 +8,7 @@ second term corrected)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import cos, hypot, pi, sin
@@ -177,18 +177,14 @@ class EllipseZone:
                 f"the zone at {speed:g} m/s is undefined: it was fitted for {low:g} to {high:g} m/s; "
                 "fit it with this speed in `speeds`"
             )
-        below = max(v for v in self.ellipses if v <= speed)
-        above = min(v for v in self.ellipses if v >= speed)
-        if below == above:
-            return self.ellipses[below]
-        share = (speed - below) / (above - below)
-        ends = [self.ellipses[v] for v in (below, above)]
-        center = np.average(
-            [e.center for e in ends], axis=0, weights=(1 - share, share)
-        )
-        matrix = np.average(
-            [_matrix(e) for e in ends], axis=0, weights=(1 - share, share)
-        )
+        speeds = find_neighbours(self.ellipses, speed)
+        ends = [self.ellipses[v] for v in speeds]
+        if len(ends) == 1:
+            return ends[0]
+        share = (speed - speeds[0]) / (speeds[1] - speeds[0])
+        weights = (1 - share, share)
+        center = np.average([e.center for e in ends], axis=0, weights=weights)
+        matrix = np.average([_matrix(e) for e in ends], axis=0, weights=weights)
         squares, axes = np.linalg.eigh(matrix)
         b, a = np.sqrt(squares)
         return Ellipse(tuple(center), (a, b), np.arctan2(axes[1, 1], axes[0, 1]))
@@ -200,6 +196,13 @@ class EllipseZone:
         return np.asarray(
             reach.reshape(directions.shape)[..., None] * unit_vectors(theta)
         )
+
+
+def find_neighbours(speeds: Iterable[float], speed: float) -> list[float]:
+    """The `speeds` next to a `speed`, below and above; one if it is among them, or outside of them."""
+    known = sorted(speeds)
+    below, above = [v for v in known if v <= speed], [v for v in known if v >= speed]
+    return sorted({*below[-1:], *above[:1]})
 
 
 def _matrix(ellipse: Ellipse) -> Array:

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
-import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from ..core.checks import Array
 from .ellipses import Ellipse
+from .sampling import Draws
 
 
 class ZoneShape(Protocol):
@@ -64,16 +64,6 @@ class Estimator(ABC):
         Ellipses (k, s, 5): centre, semi-axes [m] and angle [rad]; NaN where there is no zone.
         """
 
-    def draw_posterior(
-        self, n: int, speeds: Sequence[float], rng: np.random.Generator
-    ) -> Array | None:
-        """Draw `n` ellipses at `speeds` with `rng` from the posterior, as in `refit`; None: it has none."""
+    def draw_posterior(self, speeds: Sequence[float]) -> Draws | None:
+        """Draw ellipses at `speeds` from the posterior: values (k, s, 5) as in `refit`; None: it has none."""
         return None
-
-    def has_converged(self) -> bool:
-        """Whether the draws from the posterior can be relied on."""
-        return True
-
-    def describe_posterior(self) -> str:
-        """How the posterior was drawn from; "" if there is none."""
-        return ""

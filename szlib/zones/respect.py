@@ -33,19 +33,20 @@ Measured on zones imposed on real paths: notebook 25.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ..core.checks import Array
+from ..core.checks import Array, check_columns
 from ..core.errors import ZoneError
 from ..encounters.null_model import NullEncounters
 from ..tracks import funnels
 from .ellipses import Ellipse, EllipseZone, ellipse_reach
 from .estimators import Estimator
-from .respect_likelihood import VIEWS, Likelihood, PairPaths, zone_ellipses
+from .respect_likelihood import COLUMNS, Likelihood, PairPaths, zone_ellipses
 from .sampling import Draws
 
 # Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
@@ -104,6 +105,7 @@ class RespectEstimator(Estimator):
             raise ZoneError(
                 f"r_max is {r_max} m, that of the null model {null.r_max} m; pass the same to both"
             )
+        check_columns(samples, COLUMNS)
         is_far = samples["distance"] >= r_max
         close = funnels.select(
             samples, ~is_far, "samples: close", f"farther than {r_max} m"
@@ -116,71 +118,45 @@ class RespectEstimator(Estimator):
             reason = "of a kind that is not compared (same direction, companions), or not in the null model"
             close = funnels.select(close, of_kind, "samples: kinds compared", reason)
             against = against[against["kind"].isin(close["kind"].unique())]
-        rng, known = np.random.default_rng(0), close["encounter"].unique()
-        if len(known) > _DATA_DRAWN:
-            some = rng.choice(known, _DATA_DRAWN, replace=False)
-            drawn = close["encounter"].isin(some).to_numpy()
+        rng = np.random.default_rng(0)
+        is_drawn = _draw(close["encounter"], _DATA_DRAWN, rng)
+        if not is_drawn.all():
             reason = f"of more than {_DATA_DRAWN:,} encounters, some at random"
-            close = funnels.select(close, drawn, "samples: drawn", reason)
-        known, n = against["encounter"].unique(), close["encounter"].nunique()
+            close = funnels.select(close, is_drawn, "samples: drawn", reason)
+        n, n_null = (each["encounter"].nunique() for each in (close, against))
         size = int(np.clip(_NULL_PER_ENCOUNTER * n, *_NULL_DRAWN))
-        if len(known) > size:
-            drawn = rng.choice(known, size, replace=False)
-            against = against[against["encounter"].isin(drawn)]
-        if not (n and len(known)):
+        against = against[_draw(against["encounter"], size, rng)]
+        if not (n and n_null):
             raise ZoneError(
-                f"{n} encounters of the data and {len(known)} of the null model, of the kinds "
+                f"{n} encounters of the data and {n_null} of the null model, of the kinds "
                 f"{', '.join(_KINDS)}, came within {r_max:g} m: nothing to compare; add data, or more shifts"
             )
-        data, model = PairPaths.from_samples(close), PairPaths.from_samples(against)
+        data = PairPaths.from_samples(close)
         return cls(
             data=data,
-            null=model,
+            null=PairPaths.from_samples(against),
             encounters=data.encounters,
-            parameters={"null_encounters": len(known), "null": null.parameters},
+            parameters={"null_encounters": n_null, "null": null.parameters},
             funnel=funnels.get(close),
         )
 
-    @classmethod
-    def where_better(
-        cls,
-        samples: pd.DataFrame,
-        speeds: Sequence[float],
-        *,
-        r_max: float,
-        null: NullEncounters | None,
-    ) -> RespectEstimator | None:
-        """The estimator where the data suffices for it and shows respect, else None.
+    @property
+    def is_large(self) -> bool:
+        """Whether the data holds `MIN_COMPARED` encounters, and the null model twice as many as the data."""
+        n = len(self.encounters)
+        n_null = self.parameters["null_encounters"]
+        return bool(n >= MIN_COMPARED and n_null >= _NULL_PER_ENCOUNTER * n)
 
-        Within r_max, the data must hold 150 encounters of the kinds compared, and the null model twice as
-        many as the data. The zone must fit better than none, and contain its person at all `speeds` [m/s].
-        `samples`, `r_max` and `null` are as in `from_samples`; samples need not hold the other's view.
-        """
-        if (
-            null is None
-            or null.r_max != r_max
-            or not {*VIEWS[1]} <= {*samples} & {*null.samples}
-        ):
-            return None
-        try:
-            estimator = cls.from_samples(samples, r_max=r_max, null=null)
-            n, n_null = (
-                len(estimator.data.kind),
-                estimator.parameters["null_encounters"],
-            )
-            is_large = n >= MIN_COMPARED and n_null >= _NULL_PER_ENCOUNTER * n
-            return estimator if is_large and estimator.fit_shape(speeds) else None
-        except (
-            ZoneError
-        ):  # nothing to compare, no respect, or no zone around the person
-            return None
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        """The likelihood of the encounters, all with the same weight."""
+        return Likelihood(self.data, self.null, np.ones(len(self.encounters)))
 
     @cached_property
     def best(self) -> Array:
         """The parameters of the zone; raises ZoneError if no zone fits better than none."""
-        likelihood = Likelihood.of(self.data, self.null)
-        best = likelihood.find_best(np.random.default_rng(0))
-        evidence = 2 * likelihood.log_posterior(best)
+        best = self.likelihood.find_best(np.random.default_rng(0))
+        evidence = 2 * self.likelihood.log_posterior(best)
         if evidence < _MIN_EVIDENCE:
             raise ZoneError(
                 "no respect zone: people who ignore each other explain the data nearly as well (twice "
@@ -191,8 +167,7 @@ class RespectEstimator(Estimator):
     @cached_property
     def draws(self) -> Draws:
         """Parameters drawn from the posterior."""
-        likelihood = Likelihood.of(self.data, self.null)
-        return likelihood.draw(self.best, np.random.default_rng(0))
+        return self.likelihood.draw(self.best, np.random.default_rng(0))
 
     def fit_shape(self, speeds: Sequence[float]) -> EllipseZone:
         """Fit the ellipses at `speeds`, ascending [m/s]."""
@@ -205,28 +180,13 @@ class RespectEstimator(Estimator):
     def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
         """Fit ellipses to encounters with `weights` at `speeds`, from the fit of all."""
         fits = [
-            Likelihood.of(self.data, self.null, w).maximise([self.best])
-            for w in weights
+            Likelihood(self.data, self.null, w).maximise([self.best]) for w in weights
         ]
         return zone_ellipses(np.array(fits), speeds)
 
-    def draw_posterior(
-        self, n: int, speeds: Sequence[float], rng: np.random.Generator
-    ) -> Array:
-        """Draw `n` ellipses at `speeds` (s,) [m/s] with `rng` from the posterior, shape (n, s, 5)."""
-        return self.posterior(speeds)[rng.integers(len(self.draws.values), size=n)]
-
-    def has_converged(self) -> bool:
-        """Whether the groups of draws agree and are large enough."""
-        return self.draws.has_converged
-
-    def describe_posterior(self) -> str:
-        """Number of draws, and how well they agree."""
-        found = self.draws
-        return (
-            f"{found.n_evaluated} draws, {found.n_effective:.0f} of them effective, "
-            f"R-hat {found.r_hat:.3f}"
-        )
+    def draw_posterior(self, speeds: Sequence[float]) -> Draws:
+        """The draws as ellipses at `speeds` (s,) [m/s]: see `posterior`."""
+        return replace(self.draws, values=self.posterior(speeds))
 
     def posterior(self, speeds: Sequence[float]) -> Array:
         """All ellipses drawn from the posterior at `speeds` (s,) [m/s], shape (k, s, 5).
@@ -240,6 +200,16 @@ class RespectEstimator(Estimator):
         wide = mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)
         best = zone_ellipses(self.best[None], speeds)
         return np.asarray(np.where(_is_across(best), _exchange_axes(wide), wide))
+
+
+def _draw(
+    encounters: pd.Series[Any], size: int, rng: np.random.Generator
+) -> pd.Series[bool]:
+    """Whether each of `encounters`, one a sample, is among `size` of them drawn with `rng`, or fewer."""
+    known = encounters.unique()
+    if len(known) > size:
+        known = rng.choice(known, size, replace=False)
+    return encounters.isin(known)
 
 
 def _is_across(ellipses: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import product
 from typing import Any
 
@@ -26,6 +26,7 @@ REFERENCE_SPEED = 1.1  # at which the parameters describe the ellipse [m/s]
 _SPEED_BOUNDS = (0.3, 2.0)
 # Columns of the samples: direction of the other person, and speed, of each of the two people.
 VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
+COLUMNS = ["encounter", "distance", *VIEWS[0], *VIEWS[1]]
 
 EXCESS_PRIOR = (-3.0, 2.0)  # mean and standard deviation of log A
 # Of each parameter: lowest and highest value, mean and standard deviation of its prior.
@@ -67,7 +68,6 @@ class PairPaths:
     x, y : position in the frame of the person who carries the ellipse, shape (n,) [m].
     speed : of that person, relative to `REFERENCE_SPEED`, shape (n,) [m/s].
     encounter : row of the encounter of each sample, ascending, shape (n,).
-    first : first sample of each encounter, shape (k,).
     kind : of each encounter, shape (k,).
     encounters : one row for each encounter.
     """
@@ -76,7 +76,6 @@ class PairPaths:
     y: Array
     speed: Array
     encounter: NDArray[np.intp]
-    first: NDArray[np.intp]
     kind: NDArray[np.object_]
     encounters: pd.DataFrame
 
@@ -86,8 +85,8 @@ class PairPaths:
 
         Raises DataError if a column is missing or a value is not finite.
         """
+        check_columns(samples, COLUMNS)
         columns = ["distance", *VIEWS[0]]
-        check_columns(samples, ["encounter", *columns, *VIEWS[1]])
         is_finite = np.isfinite(samples[columns].to_numpy(float)).all(axis=1)
         check_rows(samples, is_finite, columns, "expected finite numbers")
         number, encounters = encounter_numbers(samples)
@@ -105,49 +104,45 @@ class PairPaths:
             )
             views.append(view[has_zone])
         paths = pd.concat(views).sort_values("row", kind="stable")
+        kind = encounters.get("kind", pd.Series("", encounters.index)).to_numpy(object)
         x, y, speed, row = (paths[name].to_numpy() for name in paths)
-        first = np.flatnonzero(np.diff(row, prepend=-1))
-        may_be_nearest = np.zeros(len(row), bool)
-        for p in _bank():
-            h = _signed_distances(x, y, speed, p)[0]
-            may_be_nearest |= h == np.minimum.reduceat(h, first)[row]
-        kept = row[may_be_nearest]
-        names = (
-            encounters["kind"].to_numpy(object)
-            if "kind" in encounters
-            else np.full(len(encounters), "")
+        every = cls(x, y, speed, row, kind, encounters)
+        may_be_nearest = np.any([every._is_nearest(p) for p in _bank()], axis=0)
+        of_samples = ("x", "y", "speed", "encounter")
+        return replace(
+            every, **{name: getattr(every, name)[may_be_nearest] for name in of_samples}
         )
-        x, y, speed = (each[may_be_nearest] for each in (x, y, speed))
-        return cls(
-            x,
-            y,
-            speed,
-            kept,
-            np.flatnonzero(np.diff(kept, prepend=-1)),
-            names,
-            encounters,
-        )
+
+    @cached_property
+    def first(self) -> NDArray[np.intp]:
+        """First sample of each encounter, shape (k,)."""
+        return np.flatnonzero(np.diff(self.encounter, prepend=-1))
 
     @cached_property
     def _coarse(self) -> list[NDArray[Any]]:
         """Positions and speeds in 32 bits, among which the nearest is sought: half the time of 64."""
         return [v.astype(np.float32) for v in (self.x, self.y, self.speed)]
 
-    def distances(
-        self, p: Array, *, gradient: bool = False, fast: bool = False
-    ) -> tuple[Array, Array]:
+    def distances(self, p: Array, *, fast: bool = False) -> Array:
         """h of each encounter for the parameters `p`, shape (k,) [m].
 
-        With `gradient` also its derivatives by the first eight parameters, shape (k, 8); else an empty array.
         If it must be `fast`, the nearest sample is sought in 32 bits, and h jumps by 1e-7 m: an optimiser
         that follows lines stops there, a draw does not mind.
         """
         x, y, speed = self._coarse if fast else (self.x, self.y, self.speed)
         every = _signed_distances(x, y, speed, p)[0]
-        h = np.minimum.reduceat(every, self.first)
-        if not gradient:
-            return h.astype(float), np.empty(0)
-        at = np.flatnonzero(every == h[self.encounter])
+        return np.minimum.reduceat(every, self.first).astype(float)
+
+    def _is_nearest(self, p: Array) -> NDArray[np.bool_]:
+        """Whether each sample is the nearest of its encounter, or as near, for the parameters `p`."""
+        every = _signed_distances(self.x, self.y, self.speed, p)[0]
+        return np.asarray(
+            every == np.minimum.reduceat(every, self.first)[self.encounter]
+        )
+
+    def distances_and_slopes(self, p: Array) -> tuple[Array, Array]:
+        """h (k,) [m] as from `distances`, and its derivatives by the first eight parameters, (k, 8)."""
+        at = np.flatnonzero(self._is_nearest(p))
         # the first of equal ones
         at = at[np.flatnonzero(np.diff(self.encounter[at], prepend=-1))]
         speed = self.speed[at]
@@ -247,72 +242,46 @@ class Likelihood:
     ----------
     data, null : the encounters.
     weights : of the encounters of the data, shape (k,).
-    kinds : for each kind of encounter, whether each of the data and of the null model is of it.
-    is_fast : as of `PairPaths.distances`.
     """
 
     data: PairPaths
     null: PairPaths
     weights: Array
-    kinds: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-    is_fast: bool = False
 
-    @classmethod
-    def of(
-        cls, data: PairPaths, null: PairPaths, weights: Array | None = None
-    ) -> Likelihood:
-        """Compare the kinds of `data` with those of `null`; `weights` None: equal weights."""
-        weights = np.ones(len(data.kind)) if weights is None else weights
-        return cls(
-            data,
-            null,
-            weights,
-            [(data.kind == kind, null.kind == kind) for kind in np.unique(data.kind)],
-        )
+    @cached_property
+    def kinds(self) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
+        """For each kind of encounter, whether each of the data and of the null model is of it."""
+        kind, null_kind = self.data.kind, self.null.kind
+        return [(kind == each, null_kind == each) for each in np.unique(kind)]
 
-    @property
-    def power(self) -> float:
-        """The power of the likelihood in the posterior, since the null model is random as well."""
-        return float(1 / (1 + self.weights.sum() / len(self.null.kind)))
+    def log_ratio(self, p: Array, h: Array, h_null: Array) -> float:
+        """Log likelihood ratio of the parameters `p` against no zone.
 
-    def log_ratios(self, p: Array, distances: Sequence[Array] | None = None) -> Array:
-        """Log likelihood ratio of the parameters `p` against no zone, of each encounter, shape (k,).
-
-        `distances` are h of data and null model; None: those of `p`.
+        `h` and `h_null` are the distances of the encounters of data and null model to the ellipse of `p` [m].
         """
-        h, h_null = distances or [
-            each.distances(p)[0] for each in (self.data, self.null)
-        ]
-        (g, *_), (against, *_) = (
-            respect_factor(each, *_edge(p)) for each in (h, h_null)
-        )
+        g, against = (respect_factor(each, *_edge(p))[0] for each in (h, h_null))
         out = np.log(g)
         for of_data, of_null in self.kinds:
             out[of_data] -= np.log(against[of_null].mean())
-        return np.asarray(self.weights * out)
+        return float((self.weights * out).sum())
 
-    def log_posterior(self, p: Array) -> float:
-        """Logarithm of the posterior density of the parameters `p`; 0 without a zone."""
-        h, h_null = (
-            each.distances(p, fast=self.is_fast)[0] for each in (self.data, self.null)
-        )
-        ratio = float(self.log_ratios(p, (h, h_null)).sum())
-        return self.power * ratio - _minus_log_prior(p)[0]
+    def log_posterior(self, p: Array, *, fast: bool = False) -> float:
+        """Logarithm of the posterior density of the parameters `p`; 0 without a zone.
+
+        `fast` is as in `PairPaths.distances`. The likelihood has a power, since the null model is random too.
+        """
+        h, h_null = (each.distances(p, fast=fast) for each in (self.data, self.null))
+        power = 1 / (1 + self.weights.sum() / len(self.null.kind))
+        return float(power * self.log_ratio(p, h, h_null) - _minus_log_prior(p)[0])
 
     def cost(self, p: Array) -> tuple[float, Array]:
         """Minus the log likelihood of the parameters `p` with the priors, and its gradient."""
-        (h, slope), (h_null, slope_null) = (
-            each.distances(p, gradient=True, fast=self.is_fast)
-            for each in (self.data, self.null)
-        )
-        (g, by_h, by_p), (g_null, by_h_null, by_p_null) = (
-            _factor_and_slopes(each, p) for each in (h, h_null)
-        )
-        per, per_null, value = (
-            self.weights / g,
-            np.zeros(len(g_null)),
-            self.weights @ np.log(g),
-        )
+        h, slope = self.data.distances_and_slopes(p)
+        g, by_h, by_p = _factor_and_slopes(h, p)
+        h_null, slope_null = self.null.distances_and_slopes(p)
+        g_null, by_h_null, by_p_null = _factor_and_slopes(h_null, p)
+        per, per_null = self.weights / g, np.zeros(len(g_null))
+        value = self.weights @ np.log(g)
         for of_data, of_null in self.kinds:
             n, total = self.weights[of_data].sum(), g_null[of_null].sum()
             value -= n * np.log(total / of_null.sum())
@@ -325,9 +294,8 @@ class Likelihood:
     def maximise(self, starts: Sequence[Array]) -> Array:
         """The best parameters found from several `starts`."""
         bounds = list(zip(_LOW, _HIGH, strict=True))
-        with threads().limit(
-            limits=1
-        ):  # several threads take ten times as long for small products
+        # several threads take ten times as long for small products
+        with threads().limit(limits=1):
             tries = [
                 minimize(self.cost, p, jac=True, method="L-BFGS-B", bounds=bounds)
                 for p in starts
@@ -354,34 +322,30 @@ class Likelihood:
         """The best circles of a grid of radii, edges and shares."""
         circle = np.zeros(len(_PARAMETERS))
         circle[11] = np.log(0.12)
-        # the nearest approaches
-        near = [each.distances(circle)[0] + 1 for each in (self.data, self.null)]
-        found = []
-        for radius, f, w, excess in product(
-            _RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 3)
+        nearest, nearest_null = (
+            each.distances(circle) + 1 for each in (self.data, self.null)
+        )
+        tries = []
+        for radius, *edge in product(
+            _RADII, (-3, -1), np.log([0.05, 0.15]), (-2, 2, 3)
         ):
             p = circle.copy()
-            p[3], p[5], p[8:11] = (
-                np.log(1.1 * radius),
-                np.log(0.9 * radius),
-                (f, w, excess),
-            )
-            value = (
-                self.log_ratios(p, [each - radius for each in near]).sum()
-                - _minus_log_prior(p)[0]
-            )
-            found.append((float(value), radius, p))
-        best: list[tuple[float, float, Array]] = []
-        for each in sorted(found, key=lambda found: -found[0]):
-            if all(abs(each[1] - other[1]) > _START_GAP for other in best):
-                best.append(each)
-        return [p for _, _, p in best[:_STARTS]]
+            p[[3, 5]] = np.log([1.1 * radius, 0.9 * radius])
+            p[8:11] = edge
+            ratio = self.log_ratio(p, nearest - radius, nearest_null - radius)
+            tries.append((ratio - _minus_log_prior(p)[0], radius, p))
+        best: list[Array] = []
+        while tries and len(best) < _STARTS:
+            _, at, p = max(tries, key=lambda found: found[0])
+            best.append(p)
+            tries = [each for each in tries if abs(each[1] - at) > _START_GAP]
+        return best
 
     def draw(self, start: Array, rng: np.random.Generator) -> Draws:
         """Draw parameters from the posterior around its maximum `start`, with `rng`."""
         with threads().limit(limits=1):
             return sample(
-                replace(self, is_fast=True).log_posterior,
+                partial(self.log_posterior, fast=True),
                 start,
                 _LOW,
                 _HIGH,

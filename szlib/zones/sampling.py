@@ -36,7 +36,7 @@ class Draws:
 
     Parameters
     ----------
-    values : the draws, shape (k, d).
+    values : the draws, shape (k, ...).
     r_hat : the largest R-hat of a reported parameter, between the groups.
     n_effective : number of independent draws that are worth as much as all weighted ones.
     n_evaluated : number of times that the density was evaluated.
@@ -51,6 +51,12 @@ class Draws:
     def has_converged(self) -> bool:
         """Whether the groups agree and are large enough."""
         return self.r_hat < R_HAT and self.n_effective >= EFFECTIVE
+
+    def __str__(self) -> str:
+        return (
+            f"{self.n_evaluated} draws, {self.n_effective:.0f} of them effective, "
+            f"R-hat {self.r_hat:.3f}"
+        )
 
 
 def sample(

@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -133,23 +134,20 @@ class SocialZone:
         )
 
     def __repr__(self) -> str:
+        def listed(speeds: Iterable[float]) -> str:
+            return ", ".join(f"{speed:g}" for speed in speeds) or "none"
+
+        table = self.table()
         sizes = [
-            f"{v:g}: {e.semi_axes[0]:.2f} x {e.semi_axes[1]:.2f}"
-            for v, e in self.ellipses.items()
+            f"{row.speed:g}: {row.a:.2f} x {row.b:.2f}" for row in table.itertuples()
         ]
-        adequate = [f"{speed:g}" for speed in self.ellipses if self.adequate(speed)]
-        by_verdict: dict[str, list[str]] = {}
-        for speed in self.ellipses:
-            by_verdict.setdefault(self.verdict(speed), []).append(f"{speed:g}")
-        verdicts = [
-            f"{verdict} at {', '.join(speeds)} m/s"
-            for verdict, speeds in by_verdict.items()
-        ]
+        by_verdict = table.groupby("verdict", sort=False)["speed"].agg(listed)
+        verdicts = [f"{verdict} at {at} m/s" for verdict, at in by_verdict.items()]
         return (
             f"SocialZone: method {self.method!r}, people within {self.r_max:g} m\n"
             f"semi-axes at each speed [m/s: m]: {', '.join(sizes) or 'none'}\n"
-            f"undefined at [m/s]: {', '.join(f'{speed:g}' for speed in self.undefined) or 'none'}\n"
-            f"enough encounters at [m/s]: {', '.join(adequate) or 'none'}\n"
+            f"undefined at [m/s]: {listed(self.undefined)}\n"
+            f"enough encounters at [m/s]: {listed(table['speed'][table['adequate']])}\n"
             f"verdict: {'; '.join(verdicts)}\n"
             f"intervals: {'none' if self.uncertainty is None else self.uncertainty.description}"
         )
@@ -160,7 +158,7 @@ class SocialZone:
         tracks: pd.DataFrame,
         *,
         area: object = None,
-        kinds: str | Iterable[str] | None = None,
+        kinds: str | Collection[str] | None = None,
         r_max: float = R_MAX,
         shifts: int = 99,
         seed: int = 0,
@@ -192,7 +190,6 @@ class SocialZone:
         ('usable', 'respect')
         """
         tracks, place = find_place(tracks, EncounterSettings(area=area))
-        kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
         pairs = of_kind(find_pairs(tracks, area=place, r_max=r_max), kinds)
         if pairs.empty:
             raise DataError(
@@ -262,9 +259,12 @@ class SocialZone:
         fitted_speeds = sorted({float(speed) for speed in speeds})
         if not fitted_speeds:
             raise ZoneError("no speed has a zone: `speeds` is empty")
-        method, estimator = _choose_estimator(
-            samples, method, fitted_speeds, r_max=r_max, null=null, **options
-        )
+        if method == "respect":
+            options["null"] = null
+        if method is None:
+            method, estimator = _choose_estimator(samples, fitted_speeds, r_max, null)
+        else:
+            estimator = METHODS[method][0](samples, r_max=r_max, **options)
         shape = estimator.fit_shape(fitted_speeds)
         ellipses, undefined = _fit_ellipses(shape, fitted_speeds, samples)
         provenance = _describe_source(samples, estimator, method, r_max)
@@ -378,28 +378,23 @@ class SocialZone:
         Columns: speed [m/s]; center_x, center_y, a, b [m], angle_deg [deg], area [m2], each with _low and
         _high (its interval, NaN if there is none); encounters within r_max at that speed; adequate; verdict.
         """
-        ellipses = sorted(self.ellipses.items())
         rows = [
             (v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area)
-            for v, e in ellipses
+            for v, e in sorted(self.ellipses.items())
         ]
         table = pd.DataFrame(rows, columns=["speed", *QUANTITIES]).set_index("speed")
         ends = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
         table[[*ends, "encounters"]] = np.nan
         if self.uncertainty is not None:
-            intervals = self.uncertainty.intervals.pivot(
-                index="speed", columns="quantity"
-            )
-            for name in QUANTITIES:
-                table[f"{name}_low"], table[f"{name}_high"] = (
-                    intervals["low"][name],
-                    intervals["high"][name],
-                )
+            intervals = self.uncertainty.intervals
+            for end in ("low", "high"):
+                wide = intervals.pivot(index="speed", columns="quantity", values=end)
+                table.update(wide.add_suffix(f"_{end}"))
         if self.side_counts is not None:
             table["encounters"] = self.side_counts.set_index("speed")["encounters"]
-        verdicts = [str(self.verdict(v)) for v in table.index]
         return table.assign(
-            adequate=[self.adequate(v) for v in table.index], verdict=verdicts
+            adequate=[self.adequate(v) for v in table.index],
+            verdict=[str(self.verdict(v)) for v in table.index],
         ).reset_index()
 
     def plot(self, speed: float | None = None, *, ax: Axes | None = None) -> Axes:
@@ -411,8 +406,52 @@ class SocialZone:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the zone as JSON to the file `path`, as a whole or not at all."""
-        _write(self, Path(path))
+        """Write the zone as JSON to the file `path`, as a whole or not at all.
+
+        Its verdicts are for other programs: when the file is read, they are made again. Raises ZoneError if
+        the file cannot be written.
+        """
+        shape = self.shape
+        content = {
+            "format": FORMAT,
+            "version": VERSION,
+            "units": UNITS,
+            "method": self.method,
+            "r_max": self.r_max,
+            "ellipses": [
+                {
+                    "speed": v,
+                    "center": e.center,
+                    "semi_axes": e.semi_axes,
+                    "angle": e.angle,
+                }
+                for v, e in sorted(self.ellipses.items())
+            ],
+            "undefined": [
+                {"speed": v, "why": reason}
+                for v, reason in sorted(self.undefined.items())
+            ],
+            "provenance": self.provenance,
+            "side_counts": self.side_counts,
+            "uncertainty": self.uncertainty,
+            "null_test": self.null_test,
+            "verdicts": [
+                {"speed": v, "verdict": verdict, "reasons": verdict.reasons}
+                for v, verdict in zip(
+                    self.ellipses, map(self.verdict, self.ellipses), strict=True
+                )
+            ],
+            "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
+        }
+        try:
+            content = json.loads(json.dumps(content, default=_to_json))
+            content["checksum"] = _checksum(content)
+            write_file(Path(path), json.dumps(content, indent=1))
+        except (SzlibError, OSError, TypeError, ValueError) as error:
+            raise ZoneError(
+                f"{path}: cannot write the zone ({error}); choose a file in a folder that exists and is "
+                "writable, and use only JSON values in the provenance"
+            ) from error
 
     @classmethod
     def load(cls, path: str | Path) -> SocialZone:
@@ -424,9 +463,8 @@ class SocialZone:
         try:
             return cls(**_fields(content))
         except (
-            KeyError,
+            LookupError,
             TypeError,
-            IndexError,
             ValueError,
             OverflowError,
             AttributeError,
@@ -438,22 +476,16 @@ class SocialZone:
 
 def _choose_estimator(
     samples: pd.DataFrame,
-    method: str | None,
     speeds: Sequence[float],
-    *,
     r_max: float,
     null: NullEncounters | None,
-    **options: Any,
 ) -> tuple[str, Estimator]:
-    """The method and its estimator; without a method "respect" where the data shows it, else "paper"."""
-    if method is None:
-        given: Any = {"r_max": r_max, "null": null}
-        if better := RespectEstimator.where_better(samples, speeds, **given):
-            return "respect", better
-        method = "paper"
-    if method == "respect":
-        options = {"null": null}
-    return method, METHODS[method][0](samples, r_max=r_max, **options)
+    """The estimator "respect" if the data suffices for it and shows respect, else "paper"."""
+    with suppress(SzlibError):
+        respect = RespectEstimator.from_samples(samples, r_max=r_max, null=null)
+        if respect.is_large and respect.fit_shape(speeds):
+            return "respect", respect
+    return "paper", METHODS["paper"][0](samples, r_max=r_max)
 
 
 def _fit_ellipses(
@@ -479,15 +511,13 @@ def _describe_source(
     samples: pd.DataFrame, estimator: Estimator, method: str, r_max: float
 ) -> dict[str, Any]:
     """What a zone was made from, and how: its provenance."""
-    known = set(samples)
-    numbers = encounter_numbers(samples)[1] if "encounter" in known else None
-    options = {"method": method, "r_max": float(r_max), **estimator.parameters}
+    n = len(encounter_numbers(samples)[1]) if "encounter" in samples else None
     return {
         "szlib": __version__,
-        "days": sorted(map(str, samples["day"].unique())) if "day" in known else [],
-        "encounters": None if numbers is None else len(numbers),
+        "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
+        "encounters": n,
         "hours": recorded_hours(samples),
-        "parameters": options,
+        "parameters": {"method": method, "r_max": float(r_max), **estimator.parameters},
         "funnel": estimator.funnel,
     }
 
@@ -511,46 +541,6 @@ def _check_method(method: str, options: Iterable[str] = ()) -> None:
             for each, (_, names) in METHODS.items()
         )
         raise ZoneError(f"method {method!r} has no option {name!r}; {known}")
-
-
-def _write(zone: SocialZone, path: Path) -> None:
-    """Write the `zone`, and its verdicts, to `path`; raises ZoneError if the file cannot be written.
-
-    The verdicts are for other programs: when the file is read, they are made again.
-    """
-    shape = zone.shape
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "units": UNITS,
-        "method": zone.method,
-        "r_max": zone.r_max,
-        "ellipses": [
-            {"speed": v, "center": e.center, "semi_axes": e.semi_axes, "angle": e.angle}
-            for v, e in sorted(zone.ellipses.items())
-        ],
-        "undefined": [
-            {"speed": v, "why": reason} for v, reason in sorted(zone.undefined.items())
-        ],
-        "provenance": zone.provenance,
-        "side_counts": zone.side_counts,
-        "uncertainty": zone.uncertainty,
-        "null_test": zone.null_test,
-        "verdicts": [
-            {"speed": v, "verdict": each, "reasons": each.reasons}
-            for v, each in ((v, zone.verdict(v)) for v in zone.ellipses)
-        ],
-        "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
-    }
-    try:
-        content = json.loads(json.dumps(content, default=_to_json))
-        content["checksum"] = _checksum(content)
-        write_file(path, json.dumps(content, indent=1))
-    except (SzlibError, OSError, TypeError, ValueError) as error:
-        raise ZoneError(
-            f"{path}: cannot write the zone ({error}); choose a file in a folder that exists and is "
-            "writable, and use only JSON values in the provenance"
-        ) from error
 
 
 def _read_content(path: Path) -> dict[str, Any]:
@@ -577,37 +567,35 @@ def _read_content(path: Path) -> dict[str, Any]:
 
 def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
-    r_max, side_counts = float(content["r_max"]), content["side_counts"]
+    r_max, hull = float(content["r_max"]), content["hull_vertices"]
     ellipses = {
         float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"])
         for e in content["ellipses"]
     }
-    uncertainty, null_test = content["uncertainty"], content["null_test"]
+    counts, uncertainty, test = (
+        content[name] for name in ("side_counts", "uncertainty", "null_test")
+    )
     if uncertainty is not None:
         tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands")}
         uncertainty = Uncertainty(**{**uncertainty, **tables})
-    if null_test is not None:
-        statistics = tuple(map(float, null_test["null_statistics"]))
-        respect = RespectRadius(**null_test["respect"])
-        sensor = null_test.get("sensor")
-        null_test |= {
-            "null_statistics": statistics,
-            "respect": respect,
-            "sensor": None if sensor is None else SensorCheck(**sensor),
-        }
-        null_test = NullTest(**null_test)
+    if test is not None:
+        test["null_statistics"] = tuple(test["null_statistics"])
+        test["respect"] = RespectRadius(**test["respect"])
+        if test.get("sensor") is not None:
+            test["sensor"] = SensorCheck(**test["sensor"])
+        test = NullTest(**test)
     return {
-        "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
-        if content["hull_vertices"] is not None
-        else EllipseZone(ellipses),
+        "shape": EllipseZone(ellipses)
+        if hull is None
+        else HullZone(np.array(hull, float), r_max),
         "r_max": r_max,
         "ellipses": ellipses,
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
-        "side_counts": None if side_counts is None else _table(side_counts),
+        "side_counts": None if counts is None else _table(counts),
         "uncertainty": uncertainty,
-        "null_test": null_test,
+        "null_test": test,
     }
 
 
@@ -623,16 +611,11 @@ def _table(content: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def _to_json(value: Any) -> Any:
-    """JSON values of a table, array or group of fields; NaN is null and infinity "Infinity"."""
+    """JSON values of a table, array or group of fields; missing values of a table are null."""
     if isinstance(value, pd.DataFrame):
-        return {name: column.to_numpy() for name, column in value.items()}
-    if isinstance(value, Uncertainty | NullTest | RespectRadius | SensorCheck):
+        return value.astype(object).where(value.notna(), None).to_dict("list")
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if is_dataclass(value):
         return vars(value)
-    if isinstance(value, np.generic):
-        return value.item()
-    if not isinstance(value, np.ndarray):
-        raise TypeError(f"{type(value).__name__} is no JSON value")
-    out = value.astype(object)
-    if value.dtype.kind == "f":
-        out[np.isnan(value)], out[np.isposinf(value)] = None, "Infinity"
-    return out.tolist()
+    raise TypeError(f"{type(value).__name__} is no JSON value")

@@ -32,10 +32,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import norm, percentileofscore
 
 from ..core.checks import Array, require
-from .ellipses import DIRECTIONS, ellipse_reach
+from .ellipses import DIRECTIONS, ellipse_reach, find_neighbours
 from .estimators import Estimator
 from .outliers import encounter_numbers, pair_numbers
 
@@ -103,18 +103,15 @@ def count_by_side(
     [2]
     """
     close = samples[samples["distance"] <= r_max]
-    number = encounter_numbers(close)[0]
-    side = np.rint(
-        close["los_angle"].to_numpy(float) / (2 * np.pi / len(SIDES))
-    ).astype(int) % len(SIDES)
+    side = np.rint(close["los_angle"] / (2 * np.pi / len(SIDES))) % len(SIDES)
+    met = pd.DataFrame({"side": side, "encounter": encounter_numbers(close)[0]})
     rows = []
     for speed in speeds:
-        in_band = np.abs(close["speed"].to_numpy(float) - speed) <= SPEED_BAND
-        seen = np.zeros((len(SIDES), number.max(initial=-1) + 1), bool)
-        seen[side[in_band], number[in_band]] = True
-        rows.append([speed, seen.any(axis=0).sum(), *seen.sum(axis=1)])
-    table = pd.DataFrame(rows, columns=["speed", "encounters", *SIDES])
-    return table.astype({"speed": float, **dict.fromkeys(table.columns[1:], int)})
+        in_band = met[(close["speed"] - speed).abs() <= SPEED_BAND]
+        by_side = in_band.groupby("side")["encounter"].nunique()
+        counts = by_side.reindex(range(len(SIDES)), fill_value=0)
+        rows.append([float(speed), in_band["encounter"].nunique(), *counts])
+    return pd.DataFrame(rows, columns=["speed", "encounters", *SIDES])
 
 
 def describe_missing_sides(counts: pd.DataFrame, speed: float) -> str:
@@ -122,13 +119,11 @@ def describe_missing_sides(counts: pd.DataFrame, speed: float) -> str:
 
     `counts` are as from `count_by_side`. If `speed` [m/s] lies between two of its rows, both must suffice.
     """
-    known = counts["speed"].to_numpy(float)
+    known = counts["speed"]
     if not known.min() <= speed <= known.max():
         return f"at {speed:g} m/s no encounters were counted (only at {known.min():g} to {known.max():g} m/s)"
-    rows = counts.iloc[
-        [np.flatnonzero(known <= speed)[-1], np.flatnonzero(known >= speed)[0]]
-    ]
-    fewest = rows[list(SIDES)].min()
+    near = known.isin(find_neighbours(known, speed))
+    fewest = counts.loc[near, list(SIDES)].min()
     few = [
         f"{side} ({count})" for side, count in fewest.items() if count < MIN_ENCOUNTERS
     ]
@@ -172,85 +167,72 @@ def estimate_uncertainty(
     rng = np.random.default_rng(seed)
     unit, member = resampling_units(estimator.encounters)
     n = int(member.max()) + 1
-    factor, resampled = 0.0, estimator.draw_posterior(n_resamples, speeds, rng)
-    is_posterior = resampled is not None
-    if is_posterior:
-        description = f"posterior: {estimator.describe_posterior()}"
+    estimate = _quantities(estimator.refit(np.ones((1, len(member))), speeds))
+    posterior = estimator.draw_posterior(speeds)
+    if posterior is not None:
+        description = f"posterior: {posterior}"
+        drawn = posterior.values[rng.integers(len(posterior.values), size=n_resamples)]
+        low, high = _find_percentiles(_quantities(drawn) - estimate)
+        ends = np.stack([np.minimum(low, 0), np.maximum(high, 0)])
     elif estimator.is_extreme:
         size = max(1, round(SUBSAMPLE * n))
-        drawn = (np.argsort(rng.random((n_resamples, n)), axis=1) < size).astype(int)
         ratio = (size / n) ** RATE
         factor = ratio / (1 - ratio)
         description = (
             f"subsampling: {size} of {n} {unit}; "
             f"differences times {factor:.2f} subtracted (rate {RATE:g})"
         )
+        chosen = np.argsort(rng.random((n_resamples, n)), axis=1) < size
+        drawn = estimator.refit(chosen[:, member].astype(float), speeds)
+        ends = -factor * _find_percentiles(_quantities(drawn) - estimate)[::-1]
     else:
-        drawn = rng.multinomial(n, np.full(n, 1 / n), size=n_resamples)
         description = f"bootstrap: {n} of {n} {unit}, bias-corrected percentiles"
-    ellipses = estimator.refit(np.ones((1, len(member))), speeds)
-    if resampled is None:
-        resampled = estimator.refit(drawn[:, member].astype(float), speeds)
-    reach = ellipse_reach(ellipses)
-    values = _quantities(ellipses)
-    differences = _quantities(resampled) - values
-    angle = QUANTITIES.index("angle_deg")
-    differences[..., angle] = (differences[..., angle] + 90) % 180 - 90
-    intervals = _interval(values, differences, factor, not is_posterior)
-    bands = np.maximum(
-        _interval(reach, ellipse_reach(resampled) - reach, factor, not is_posterior), 0
-    )
-    tables = (
-        _interval_table(speeds, "quantity", QUANTITIES, intervals),
-        _interval_table(speeds, "direction", DIRECTIONS, bands),
-    )
-    converged = estimator.has_converged()
+        counts = rng.multinomial(n, np.full(n, 1 / n), size=n_resamples)
+        drawn = estimator.refit(counts[:, member].astype(float), speeds)
+        ends = _find_percentiles(_quantities(drawn) - estimate, corrects_bias=True)
+    intervals, bands = np.split(estimate + ends, [len(QUANTITIES)], axis=-1)
     return Uncertainty(
-        LEVEL, int(n_resamples), unit, description, *tables, has_converged=converged
+        LEVEL,
+        int(n_resamples),
+        unit,
+        description,
+        _table(speeds, "quantity", QUANTITIES, intervals),
+        _table(speeds, "direction", DIRECTIONS, np.maximum(bands, 0)),
+        has_converged=posterior is None or posterior.has_converged,
     )
 
 
 def _quantities(ellipses: Array) -> Array:
-    """`QUANTITIES` (..., 6) of ellipses (..., 5)."""
+    """`QUANTITIES` of ellipses (..., 5), and their reach in each of `DIRECTIONS`, shape (..., 6 + 72)."""
     m, n, a, b, angle = np.moveaxis(ellipses, -1, 0)
-    return np.stack([m, n, a, b, np.degrees(angle), np.pi * a * b], axis=-1)
+    numbers = np.stack([m, n, a, b, np.degrees(angle), np.pi * a * b], axis=-1)
+    return np.concatenate([numbers, ellipse_reach(ellipses)], axis=-1)
 
 
-def _interval(
-    values: Array, differences: Array, factor: float, corrects: bool = True
-) -> Array:
-    """Low and high (2, s, k) around values (1, s, k), from the differences (r, s, k) of the resamples.
+def _find_percentiles(differences: Array, corrects_bias: bool = False) -> Array:
+    """Low and high end (2, s, k) of the middle `LEVEL` of differences (r, s, k) of `_quantities`.
 
-    With `factor` 0 the ends are percentiles: bias-corrected if `corrects`, else moved outwards to the value
-    where it is outside. Otherwise the quantiles of the differences, times `factor`, are subtracted.
+    NaN if too many of them are NaN. If it `corrects_bias`, both levels are moved by twice the normal quantile
+    of the share below 0.
     """
-    has_interval = np.isnan(differences).mean(axis=0) <= _MAX_FAILED
-    tails, ends = (
-        np.full((2, *has_interval.shape), np.nan),
-        np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2]),
-    )
-    for at in zip(*np.nonzero(has_interval), strict=True):
-        known = differences[:, *at][~np.isnan(differences[:, *at])]
-        below = np.mean(known < 0) + np.mean(known == 0) / 2
-        bias = (
-            0.0
-            if factor or not corrects
-            else np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS)
-        )
-        tails[:, *at] = np.quantile(known, norm.cdf(2 * bias + norm.ppf(ends)))
-    if not corrects:
-        tails = np.stack([np.minimum(tails[0], 0), np.maximum(tails[1], 0)])
-    return np.asarray(values - factor * tails[::-1] if factor else values + tails)
+    angle = QUANTITIES.index("angle_deg")
+    differences[..., angle] = (differences[..., angle] + 90) % 180 - 90
+    ends = np.full((2, *differences.shape[1:]), np.nan)
+    for at in np.ndindex(differences.shape[1:]):
+        drawn = differences[:, *at]
+        known = drawn[~np.isnan(drawn)]
+        if len(known) >= (1 - _MAX_FAILED) * len(drawn):
+            below = percentileofscore(known, 0, kind="mean") / 100
+            bias = np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS) * corrects_bias
+            levels = norm.cdf(2 * bias + norm.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+            ends[:, *at] = np.quantile(known, levels)
+    return ends
 
 
-def _interval_table(
-    speeds: Sequence[float], name: str, values: Sequence[str] | Array, interval: Array
+def _table(
+    speeds: Sequence[float], name: str, values: Sequence[str] | Array, ends: Array
 ) -> pd.DataFrame:
-    return pd.DataFrame(
-        {
-            "speed": np.repeat(np.asarray(speeds, float), len(values)),
-            name: np.tile(np.asarray(values), len(speeds)),
-            "low": interval[0].ravel(),
-            "high": interval[1].ravel(),
-        }
-    )
+    """Rows speed, a value of `name`, low, high from the `ends` (2, speeds, values) of intervals."""
+    index = pd.MultiIndex.from_product([speeds, values], names=["speed", name])
+    table = pd.DataFrame(ends.reshape(2, -1).T, index, columns=["low", "high"])
+    return table.reset_index()

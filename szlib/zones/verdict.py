@@ -14,6 +14,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from .ellipses import find_neighbours
+
 USABLE, UNDECIDED, NO_RESPECT = "usable", "undecided", "no respect shown"
 # Encounters that a description needs (paper, hull): on real people the intervals of fewer hold the
 # truth too rarely (measured).
@@ -70,15 +72,14 @@ def judge(zone: FittedZone, speed: float) -> Verdict:
             NO_RESPECT,
             [f"people came as near as people who ignore each other would: {compared}"],
         )
+    missing = describe_missing_encounters(zone.provenance), zone.missing_data(speed)
     reasons = [
-        *filter(
-            None,
-            (describe_missing_encounters(zone.provenance), zone.missing_data(speed)),
-        )
+        *filter(None, missing),
+        *funnels.warnings(zone.provenance.get("funnel", [])),
+        *_null_model(zone),
+        *_place(zone, speed),
+        *_width(zone, speed),
     ]
-    reasons += funnels.warnings(zone.provenance.get("funnel", []))
-    reasons += [*_null_model(zone), *_sensor(zone)]
-    reasons += [*_place(zone, speed), *_width(zone, speed)]
     if reasons:
         return Verdict(UNDECIDED, reasons)
     sensor = [] if test.sensor is None else [f"sensor: {test.sensor}"]
@@ -94,16 +95,15 @@ def describe_missing_encounters(provenance: Mapping[str, Any]) -> str:
     method = provenance.get("parameters", {}).get("method")
     if not n or n >= MIN_TOTAL or method == "respect":
         return ""
-    more = (
-        ""
-        if not hours
-        else f": {(MIN_TOTAL / n - 1) * hours:.2g} more hours of recording at this rate"
-    )
-    return f"{n} encounters were found, {MIN_TOTAL} are needed{more}"
+    message = f"{n} encounters were found, {MIN_TOTAL} are needed"
+    if not hours:
+        return message
+    more = (MIN_TOTAL / n - 1) * hours
+    return f"{message}: {more:.2g} more hours of recording at this rate"
 
 
 def _null_model(zone: FittedZone) -> Iterator[str]:
-    """What is missing in the comparison with people who ignore each other."""
+    """What is missing in the comparison with people who ignore each other, or explained by the sensor."""
     test = zone.null_test
     if test is None:
         yield "no null model: fit the zone with SocialZone.from_tracks(tracks)"
@@ -121,14 +121,8 @@ def _null_model(zone: FittedZone) -> Iterator[str]:
             f"{test.grouped:.0%} of the people walk with somebody, and the null model moved each alone: "
             "groups look like respect then; compare every pair, with szlib.find_pairs and szlib.null_pairs"
         )
-
-
-def _sensor(zone: FittedZone) -> Iterator[str]:
-    """What the sensor explains: a tracker that loses people who are near each other."""
-    test = zone.null_test
-    if test is None or test.sensor is None or not test.sensor.loses_people:
-        return
-    if test.p_beyond is None or test.p_beyond > SIGNIFICANCE:
+    loses_people = test.sensor is not None and test.sensor.loses_people
+    if loses_people and test.p_beyond > SIGNIFICANCE:
         yield (
             f"the tracker loses people nearer than {test.sensor.resolved:.1f} m to each other "
             f"({test.sensor}), and beyond that no respect shows (p = {test.p_beyond:.2g})"
@@ -140,7 +134,7 @@ def _place(zone: FittedZone, speed: float) -> Iterator[str]:
     test = zone.null_test
     resolved = 0.0 if test is None or test.sensor is None else test.sensor.resolved
     shifted = 0.0 if test is None else test.null_radius
-    for fitted in _neighbours(zone, speed):
+    for fitted in find_neighbours(zone.ellipses, speed):
         low = np.sqrt(np.maximum(_interval(zone, fitted, "area")[0], 0.0) / np.pi)
         if np.isnan(low):  # `_width` says so
             continue
@@ -160,7 +154,7 @@ def _width(zone: FittedZone, speed: float) -> Iterator[str]:
     """What is wrong with the intervals: missing, of draws that disagree, or too wide."""
     if zone.uncertainty is not None and not zone.uncertainty.has_converged:
         yield f"the draws of the posterior do not agree ({zone.uncertainty.description})"
-    for fitted in _neighbours(zone, speed):
+    for fitted in find_neighbours(zone.ellipses, speed):
         for name, value in zip(
             ("a", "b"), zone.ellipses[fitted].semi_axes, strict=True
         ):
@@ -185,17 +179,6 @@ def _interval(zone: FittedZone, speed: float, quantity: str) -> tuple[float, flo
     """Low and high end of the interval of a `quantity` at a fitted `speed`; NaN if there is none."""
     if zone.uncertainty is None:
         return np.nan, np.nan
-    rows = zone.uncertainty.intervals
-    row = rows[(rows["speed"] == speed) & (rows["quantity"] == quantity)]
-    return (
-        (float(row["low"].iloc[0]), float(row["high"].iloc[0]))
-        if len(row)
-        else (np.nan, np.nan)
-    )
-
-
-def _neighbours(zone: FittedZone, speed: float) -> list[float]:
-    """The fitted speeds next to `speed` [m/s], below and above; one if it was fitted itself."""
-    fitted = sorted(zone.ellipses)
-    below, above = [v for v in fitted if v <= speed], [v for v in fitted if v >= speed]
-    return sorted({*below[-1:], *above[:1]})
+    intervals = zone.uncertainty.intervals.set_index(["speed", "quantity"])
+    low, high = intervals.loc[(speed, quantity), ["low", "high"]]
+    return low, high

@@ -19,7 +19,6 @@ from szlib.zones.uncertainty import (
     MIN_ENCOUNTERS,
     QUANTITIES,
     SIDES,
-    _interval,
     count_by_side,
     describe_missing_sides,
     estimate_uncertainty,
@@ -188,37 +187,64 @@ def test_invalid_n_resamples_is_refused(
         )
 
 
+class Known(Estimator):
+    """An estimator whose ellipses are known: centres ahead at 5 m, and elsewhere in each resample."""
+
+    def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
+        raise NotImplementedError
+
+    def refit(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
+        ellipses = np.tile([5.0, 0.0, 1.0, 0.7, 0.0], (len(weights), len(speeds), 1))
+        if len(weights) > 1:
+            ellipses[..., 0] += self.parameters["differences"][:, None]
+        return ellipses
+
+
+class KnownExtreme(Known):
+    """As `Known`, of an extreme."""
+
+    is_extreme = True
+
+
+def interval(
+    differences: np.ndarray, kind: type[Known] = Known, n: int = 30
+) -> np.ndarray:
+    """Low and high of the centre ahead, if it differs so in the resamples of `n` encounters."""
+    encounters = pd.DataFrame({"encounter": range(n)})
+    parameters = {"differences": np.random.default_rng(0).permuted(differences)}
+    found = estimate_uncertainty(
+        kind(encounters=encounters, parameters=parameters, funnel=[]),
+        SPEEDS,
+        n_resamples=len(differences),
+        seed=0,
+    ).intervals.set_index("quantity")
+    return found.loc["center_x", ["low", "high"]].to_numpy(float)
+
+
 def test_intervals_are_quantiles_of_the_differences() -> None:
-    differences = np.random.default_rng(0).permuted(np.linspace(-1, 3, 4001))[
-        :, None, None
-    ]
-    values = np.full((1, 1, 1), 5.0)
-    low, high = _interval(values, differences, 0.5).ravel()
-    assert (low, high) == pytest.approx((5 - 0.5 * 2.9, 5 + 0.5 * 0.9)), (
-        "mirrored, times the factor"
-    )
-    centred = differences - 1
-    assert _interval(values, centred, 0.0).ravel() == pytest.approx(
-        (5 - 1.9, 5 + 1.9)
-    ), "no bias"
+    differences = np.linspace(-1, 3, 4001)
+    factor = np.sqrt(1 / 2) / (1 - np.sqrt(1 / 2))  # one of two encounters, rate 1/2
+    found = interval(differences, KnownExtreme, n=2)
+    expected = (5 - 2.9 * factor, 5 + 0.9 * factor)
+    assert found == pytest.approx(expected), "mirrored, times the factor"
+    assert interval(differences - 1) == pytest.approx((5 - 1.9, 5 + 1.9)), "no bias"
 
 
 def test_percentiles_are_corrected_for_bias() -> None:
     """A share of 60 % lies below: both levels are moved up by twice its normal quantile."""
-    differences = np.linspace(-0.6, 0.4, 1001)[:, None, None]
     bias = 2 * norm.ppf((600 + 1 / 2) / 1001)
     levels = norm.cdf(bias + norm.ppf([0.025, 0.975]))
-    found = _interval(np.zeros((1, 1, 1)), differences, 0.0).ravel()
-    assert found == pytest.approx(-0.6 + levels, abs=1e-9)
+    found = interval(np.linspace(-0.6, 0.4, 1001))
+    assert found == pytest.approx(5 - 0.6 + levels, abs=1e-9)
 
 
 def test_an_interval_needs_a_zone_in_most_resamples() -> None:
-    differences = np.linspace(-1, 1, 100)[:, None, None].copy()
+    differences = np.linspace(-1, 1, 100)
     failed = int(_MAX_FAILED * 100)
     differences[:failed] = np.nan
-    assert np.isfinite(_interval(np.zeros((1, 1, 1)), differences, 0.0)).all()
+    assert np.isfinite(interval(differences)).all()
     differences[: failed + 1] = np.nan
-    assert np.isnan(_interval(np.zeros((1, 1, 1)), differences, 0.0)).all()
+    assert np.isnan(interval(differences)).all()
 
 
 class Turning(Estimator):

@@ -52,7 +52,7 @@ def draw_encounters(
     null: PairPaths, p: np.ndarray, rng: np.random.Generator
 ) -> PairPaths:
     """Draw encounters of `null` with the frequencies of the model with parameters `p`."""
-    g = model.respect_factor(null.distances(p)[0], *model._edge(p))[0]
+    g = model.respect_factor(null.distances(p), *model._edge(p))[0]
     share = np.zeros(len(g))
     for kind in np.unique(null.kind):
         of_kind = null.kind == kind
@@ -67,7 +67,6 @@ def draw_encounters(
         y=null.y[every],
         speed=null.speed[every],
         encounter=number,
-        first=np.flatnonzero(np.diff(number, prepend=-1)),
         kind=null.kind[drawn],
         encounters=null.encounters.iloc[drawn],
     )
@@ -82,7 +81,7 @@ def find_ranks(n: int) -> Iterator[dict[str, float]]:
         rng = np.random.default_rng([seed, 1])
         p = draw_prior(rng)
         data = draw_encounters(null, p, rng)
-        likelihood = Likelihood.of(data, null, weights)
+        likelihood = Likelihood(data, null, weights)
         found = likelihood.draw(likelihood.find_best(rng), rng)
         thinned = found.values[rng.choice(len(found.values), RANKS - 1, replace=False)]
         ranks = dict(zip(NAMES, (thinned < p).sum(axis=0).tolist(), strict=True))
