@@ -9,14 +9,14 @@ computed again, so a run that was stopped or killed continues where it ended.
 from __future__ import annotations
 
 import io
+import json
 import time
 import warnings
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,8 @@ from ..core.files import claim_folder, folder_purpose, load_cached, store_cached
 from ..core.input_files import (
     file_content,
     printable,
-    read_json_object,
+    read_small,
+    reading,
     unchanged_files,
 )
 from ..core.parallel import run_tasks
@@ -38,14 +39,14 @@ from ..tracks import datasets, funnels
 from ..tracks.clock import read_tracks, to_clock
 from ..tracks.readers import find_day, find_format, name_recordings
 from ..tracks.recipe import Recipe, find_recipe
-from .areas import AUTO, area_for, as_area, has_calendar, place_apart
-from .finding import find_encounters
+from .areas import AUTO, as_area, has_calendar
+from .finding import find_encounters, find_place
 from .geometry import Area, AttentionalSpace
 from .near_rows import read_near_area
 from .samples import no_samples
 from .settings import EncounterSettings
 
-# Advice by a word of the condition that rejected everything.
+# Advice by a word of the condition that rejected everything; the last one fits all others.
 _ADVICE = {
     "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
     "not in the area": 'give an area in which people walked: four numbers or a polygon, or "auto"',
@@ -55,10 +56,25 @@ _ADVICE = {
     "nobody": "people were never near each other: more data, or a larger space",
     "several": "it was crowded: a smaller space",
     "nearer": "people came into view late: pass a smaller min_distance",
-    "somebody else": "more data, or other conditions (szlib.find_encounters)",
+    "": "more data, or other conditions (szlib.find_encounters)",
 }
 # of the cached result of a day; a result of another version is computed again
 _VERSION = 9
+# purpose of an extraction's folder, as its marker states it
+PURPOSE = "encounters by day"
+_READ = "read all files"  # the first stage of the funnel of many days
+# Columns of the table of days, with the values of an excluded day.
+_ROW: dict[str, Any] = {
+    "day": "",
+    "status": "excluded",
+    "files": 0,
+    "rows": 0,
+    "unusable": 0,
+    "encounters": 0,
+    "samples": 0,
+    "seconds": 0.0,
+    "why": "",
+}
 
 
 def find_encounters_in_files(
@@ -69,7 +85,7 @@ def find_encounters_in_files(
     `settings` say what counts as an encounter, `recipe` how the files are read.  Raises DataError also where
     a file changes meanwhile.
     """
-    tracks, settings = read_for_encounters(files, settings, recipe)
+    tracks = read_for_encounters(files, settings, recipe)
     if len(tracks) == 0:
         return funnels.attach(no_samples(), funnels.get(tracks))
     return find_encounters(tracks, settings=settings)
@@ -77,65 +93,27 @@ def find_encounters_in_files(
 
 def read_for_encounters(
     files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
-) -> tuple[pd.DataFrame, EncounterSettings]:
-    """The tracks on which encounters in the `files` of one day depend, and the `settings` with their area.
-
-    The files are read as `recipe` says.
-    """
-    with unchanged_files(files):
-        area = known_area(settings, files, recipe)
-        raw = read_near_area(
-            files, area=area, duration=settings.duration, recipe=recipe
-        )
-    tracks = to_clock(raw, max_gap=recipe.max_gap) if len(raw) else raw
-    return tracks, replace(settings, area=area or AUTO)
-
-
-def with_area(
-    settings: EncounterSettings,
-    files: Sequence[Path],
-    recipe: Recipe,
-    tracks: pd.DataFrame | None = None,
-) -> EncounterSettings:
-    """The `settings` with the area of these `files` where it is "auto" or None.
-
-    The files are read as `recipe` say, unless their `tracks` are given.
-    """
-    area = known_area(settings, files, recipe)
-    if area is None:
-        if tracks is None:
-            # Reading the day itself warns of rejected rows.
-            with warnings.catch_warnings(action="ignore", category=DataWarning):
-                tracks = read_tracks(files, recipe=recipe)
-        area = area_for(place_apart(tracks), AUTO, settings.space)
-    return replace(settings, area=area)
+) -> pd.DataFrame:
+    """The tracks on which encounters in the `files` of one day depend; arguments as above."""
+    raw = read_near_area(files, settings, recipe)
+    return to_clock(raw, max_gap=recipe.max_gap) if len(raw) else raw
 
 
 def find_area(
-    files: Sequence[str], settings: EncounterSettings, recipe: Recipe
-) -> tuple[EncounterSettings, list[Any] | None]:
-    """The `settings` with the area of `files`, and the contents of these if it was found in them.
+    files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
+) -> Area:
+    """The area of `files` of one place: that of the `settings`, of the `recipe` or of the mall's files.
 
-    The files are read as `recipe` say; for their contents see `describe_source`.
+    Without one the files are read, to find where people walked.  Then the area has a `reason`.
     """
-    paths = [Path(file) for file in files]
-    with unchanged_files(paths):
-        is_known = known_area(settings, paths, recipe) is not None
-        contents = (
-            None if is_known else describe_source(files, settings, recipe)["files"]
-        )
-        return with_area(settings, paths, recipe), contents
-
-
-def known_area(
-    settings: EncounterSettings, files: Sequence[Path], recipe: Recipe
-) -> Area | None:
-    """The area of the `settings`, of the `recipe`, or of the mall's `files`; None where it must be found."""
-    if isinstance(settings.area, Area):
-        return settings.area
-    areas = {find_format(file, recipe).area for file in files}
-    known = areas.pop() if settings.area is None and len(areas) == 1 else None
-    return as_area(known) if known and known != AUTO else None
+    areas = {settings.area}
+    if settings.area is None:
+        areas = {find_format(file, recipe).area for file in files}
+    if len(areas) == 1 and not areas & {None, AUTO}:
+        return as_area(areas.pop())
+    # Reading the day itself warns of rejected rows.
+    with warnings.catch_warnings(action="ignore", category=DataWarning):
+        return find_place(read_tracks(files, recipe=recipe), settings)[1]
 
 
 def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
@@ -149,58 +127,46 @@ def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
         raise DataError(
             "the table of samples is empty, and has no funnel that says why"
         )
-    rows = ", ".join(
-        f"{count:,} {reason}" for reason, count in emptied["rejected"].items()
-    )
-    last = list(emptied["rejected"])[-1]
-    usual = next(
-        (text for words, text in _ADVICE.items() if words in last),
-        _ADVICE["somebody else"],
-    )
+    rejected = emptied["rejected"]
+    rows = ", ".join(f"{count:,} {reason}" for reason, count in rejected.items())
+    last = [*rejected][-1]
+    advice = next(text for words, text in _ADVICE.items() if words in last)
     raise DataError(
         f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
-        f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {usual}"
+        f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {advice}"
     )
 
 
 def describe_source(
-    files: Sequence[str], settings: EncounterSettings, recipe: Recipe
+    files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
 ) -> dict[str, Any]:
     """What the encounters of a day are made of, in JSON values.
 
     It holds names, sizes and checksums of the `files`, `settings`, `recipe`, and the version of szlib.
     """
-    content = sorted([Path(file).name, *file_content(Path(file))] for file in files)
-    parameters = settings.as_json() | {"recipe": recipe.as_json()}
     return {
         "version": _VERSION,
         "szlib": __version__,
-        "files": content,
-        "parameters": parameters,
+        "files": sorted([file.name, *file_content(file)] for file in files),
+        "parameters": settings.as_json() | {"recipe": recipe.as_json()},
     }
 
 
-def read_parameters(
-    parameters: Mapping[str, Any],
-) -> tuple[EncounterSettings, Recipe]:
-    """Settings and recipe from the `parameters` of `describe_source`; a missing one has its default."""
-    values = {**parameters, "space": AttentionalSpace(**parameters["space"])}
-    known = {each.name for each in fields(EncounterSettings)} & values.keys()
-    settings = EncounterSettings(**{name: values[name] for name in known})
-    return settings, Recipe(**values.get("recipe", {}))
-
-
-def load_day(
-    folder: Path, day: str, source: Mapping[str, Any] | None
-) -> pd.DataFrame | None:
+def load_day(folder: Path, day: str, source: Mapping[str, Any]) -> pd.DataFrame | None:
     """The samples of a `day` in `folder`; None if missing, damaged, or made of another `source`."""
     content = load_cached(folder / f"{day}.parquet", source)
     return None if content is None else pd.read_parquet(io.BytesIO(content))
 
 
-# purpose of an extraction's folder, as its marker states it
-PURPOSE = "encounters by day"
-_READ = "read all files"  # the first stage of the funnel of many days
+def _add_stages(samples: Iterable[pd.DataFrame]) -> list[dict[str, Any]]:
+    """The funnels of several `samples`, added up as if their files had been read together."""
+    return funnels.add(
+        [
+            stage | {"stage": _READ} if stage["stage"].startswith("read ") else stage
+            for stage in funnels.get(each)
+        ]
+        for each in samples
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,11 +179,9 @@ class Extraction:
     table : one row a day: day, status ("done" now, "kept" from before, "excluded", "failed"), files, rows
         read, unusable rows among them, encounters, samples, seconds, and why a day failed, or what is
         implausible in it.
-    exclude : days that were left out.
-    sources : what the result of each finished day is made of: content, parameters and version.
-    area : where encounters were searched, the same in every day; None where each recording has its own, or
-        no day has one.
     settings, recipe : what counted as an encounter, and how the files were read.
+    sources : what the result of each finished day is made of: content, parameters and version.
+    exclude : days that were left out.
 
     Examples
     --------
@@ -231,11 +195,10 @@ class Extraction:
 
     out: Path
     table: pd.DataFrame
-    exclude: tuple[str, ...] = ()
-    sources: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    area: Area | None = None
-    settings: EncounterSettings = field(default_factory=EncounterSettings)
-    recipe: Recipe = field(default_factory=Recipe)
+    settings: EncounterSettings
+    recipe: Recipe
+    sources: Mapping[str, Mapping[str, Any]]
+    exclude: Collection[str]
 
     @classmethod
     def load(cls, out: str | Path, *, exclude: Iterable[str] = ()) -> Extraction:
@@ -246,7 +209,7 @@ class Extraction:
         DataError : the folder holds no extracted days, or they differ in settings or version; or none is
             left, or a day is damaged.
         """
-        folder, excluded = Path(out), sorted(map(str, exclude))
+        folder, excluded = Path(out), _find_excluded(exclude)
         if folder_purpose(folder) != PURPOSE:
             raise DataError(
                 f"{folder}: holds no extracted days; expected a folder of `szlib extract`"
@@ -256,28 +219,32 @@ class Extraction:
             for file in folder.glob("*.parquet.json")
         }
         sources: dict[str, dict[str, Any]] = {}
-        for day in sorted(stored.keys() - set(excluded)):
-            sources[day] = read_json_object(stored[day]).get("made_of") or {}
-            if "parameters" not in sources[day]:
-                raise DataError(f"{stored[day]}: is damaged; extract the day again")
+        for day in sorted(stored.keys() - excluded):
+            expected = "one of this version; extract the day again"
+            with reading(stored[day], "as an extracted day", expected):
+                sources[day] = json.loads(read_small(stored[day]))["made_of"]
+                parameters = dict(sources[day]["parameters"])
+                recipe = Recipe(**parameters.pop("recipe"))
+                space = AttentionalSpace(**parameters.pop("space"))
+                settings = EncounterSettings(space=space, **parameters)
         if not sources:
             raise DataError(
                 f"{folder}: no day is left; all of {', '.join(sorted(stored))} are excluded"
             )
-        first = next(iter(sources))
-        made_by = [{**source, "files": None} for source in sources.values()]
-        if other := next(
-            (day for day, of in zip(sources, made_by, strict=True) if of != made_by[0]),
-            None,
-        ):
-            raise DataError(
-                f"{folder}: {other} was extracted with other settings than {first}, or another version; "
-                "extract all days again, or exclude it"
-            )
+        first, *others = sources
+        for day in others:
+            if sources[day] | {"files": None} != sources[first] | {"files": None}:
+                raise DataError(
+                    f"{folder}: {day} was extracted with other settings than {first}, or another version; "
+                    "extract all days again, or exclude it"
+                )
         table = pd.DataFrame({"day": list(sources), "status": "kept"})
-        settings, recipe = read_parameters(sources[first]["parameters"])
-        area = settings.area if isinstance(settings.area, Area) else None
-        return cls(folder, table, tuple(excluded), sources, area, settings, recipe)
+        return cls(folder, table, settings, recipe, sources, excluded)
+
+    @property
+    def area(self) -> Area | None:
+        """Where encounters were searched, the same in every day; None where each has its own, or none."""
+        return self.settings.area if isinstance(self.settings.area, Area) else None
 
     @property
     def failed(self) -> pd.DataFrame:
@@ -295,40 +262,26 @@ class Extraction:
         ------
         DataError : no day is finished, or another run has since replaced a result in the folder.
         """
-        days = self.table.loc[self.table["status"].isin(["done", "kept"]), "day"]
-        if len(days) == 0:
-            raise DataError(f"no day was finished in {self.out}; see the table: {self}")
-        parts, stages, count = [], [], 0
-        for day in sorted(days):
-            part = load_day(self.out, day, self.sources.get(day))
+        parts = {}
+        for day in sorted(self.sources):
+            part = load_day(self.out, day, self.sources[day])
             if part is None:
                 raise DataError(
                     f"{self.out / day}.parquet: is not the result of this extraction (another run, other "
                     "data or parameters, or damage); extract again, into another folder"
                 )
-            stages.append(
-                [
-                    s | {"stage": _READ} if s["stage"].startswith("read ") else s
-                    for s in funnels.get(part)
-                ]
-            )
-            part = part[~part["day"].isin(self.exclude)]
-            numbers, found = pd.factorize(part["encounter"])
-            parts.append(
-                part.assign(
-                    encounter=numbers + count, day=part["day"].astype(str), file=day
-                )
-            )
-            count += len(found)
-        shared = Counter(name for part in parts for name in part["day"].unique())
-        for k, part in enumerate(parts):
-            ambiguous = part["day"].map(shared) > 1
-            day = part["day"].where(~ambiguous, part["day"] + " (" + part["file"] + ")")
-            parts[k] = part.assign(day=day).drop(columns="file")
-        samples = pd.concat(
-            [part for part in parts if len(part)] or parts[:1], ignore_index=True
-        )
-        return funnels.attach(samples.astype({"day": "category"}), funnels.add(stages))
+            parts[day] = part.astype({"day": str})
+        if not parts:
+            raise DataError(f"no day was finished in {self.out}; see the table: {self}")
+        samples = pd.concat(parts, names=["file"]).reset_index("file")
+        samples = samples[~samples["day"].isin(self.exclude)].reset_index(drop=True)
+        samples["encounter"] = samples.groupby(
+            ["file", "encounter"], sort=False
+        ).ngroup()
+        names = samples["day"] + " (" + samples.pop("file") + ")"
+        n_files = names.groupby(samples["day"]).transform("nunique")
+        samples["day"] = samples["day"].where(n_files == 1, names).astype("category")
+        return funnels.attach(samples, _add_stages(parts.values()))
 
     def __str__(self) -> str:
         shown = self.table.to_string(index=False, float_format="{:.1f}".format)
@@ -383,130 +336,112 @@ def extract_days(
     >>> days.samples()["encounter"].nunique() > 0
     True
     """
-    read_names = {each.name for each in fields(Recipe)} - {"area"}
-    others = {
-        name: value for name, value in parameters.items() if name not in read_names
-    }
-    settings = (settings or EncounterSettings()).with_parameters(others)
-    folder = Path(out)
-    excluded = (
-        (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
-    )
+    names = {each.name for each in fields(Recipe)} - {"area"}
+    of_recipe = {name: parameters.pop(name) for name in names & parameters.keys()}
+    settings = (settings or EncounterSettings()).with_parameters(parameters)
     files = sorted({file.resolve() for file in datasets.find(paths)})
-    reading = {k: v for k, v in parameters.items() if k in read_names}
-    recipe = find_recipe(files, recipe, **reading)
-    claim_folder(folder, PURPOSE, inputs=files)
+    recipe = find_recipe(files, recipe, **of_recipe)
+    folder, excluded = claim_folder(out, PURPOSE, inputs=files), _find_excluded(exclude)
     days = _group_by_day(files, recipe)
-    included = [
-        (day, of_day) for day, of_day in sorted(days.items()) if day not in excluded
-    ]
-    given, contents = settings, {}
-    shared = [each for each in included if has_calendar(each[0]) or len(included) == 1]
-    for day, of_day in shared:
-        with suppress(
-            SzlibError
-        ):  # the first day with an area; computing a day that fails says why
-            settings, contents[day] = find_area(of_day, settings, recipe)
+    included = {day: days[day] for day in sorted(days.keys() - excluded)}
+    shared = [day for day in included if has_calendar(day) or len(included) == 1]
+    common, contents = settings, {}
+    for day in shared:
+        # the first day with an area; computing a day that fails says why
+        with suppress(SzlibError), unchanged_files(included[day]):
+            area = find_area(included[day], settings, recipe)
+            common = replace(settings, area=area)
+            if area.reason:
+                contents[day] = describe_source(included[day], common, recipe)
             break
-    rows = [
-        _row(day, of_day, status="excluded")
-        for day, of_day in days.items()
-        if day in excluded
-    ]
     tasks = [
         joblib.delayed(extract_day)(
             day,
             of_day,
-            str(folder.resolve()),
-            settings if (day, of_day) in shared else given,
+            folder.resolve(),
+            common if day in shared else settings,
             recipe,
             contents.get(day),
         )
-        for day, of_day in included
+        for day, of_day in included.items()
     ]
-    with tqdm(total=len(tasks), unit="day", disable=None if progress else True) as bar:
-        for row in run_tasks(tasks, n_jobs=n_jobs):
-            rows.append(row)
-            bar.update()
-            bar.set_postfix_str(f"{row['day']} {row['status']}")
-    sources = {row["day"]: row.pop("source") for row in rows}
-    table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
-    is_one = shared == included or given.area == settings.area
-    settings = settings if is_one else given
-    area = settings.area if isinstance(settings.area, Area) else None
-    return Extraction(folder, table, excluded, sources, area, settings, recipe)
+    rows = [
+        _ROW | {"day": day, "files": len(days[day])} for day in days.keys() & excluded
+    ]
+    found = run_tasks(tasks, n_jobs=n_jobs)
+    is_hidden = None if progress else True  # None: shown in a terminal
+    rows += tqdm(found, total=len(tasks), unit="day", disable=is_hidden)
+    table = pd.DataFrame(rows, columns=list(_ROW)).sort_values("day", ignore_index=True)
+    sources = {row["day"]: row["source"] for row in rows if "source" in row}
+    if len(shared) < len(included):
+        common = settings
+    return Extraction(folder, table, common, recipe, sources, excluded)
 
 
-def _group_by_day(files: Sequence[Path], recipe: Recipe) -> dict[str, list[str]]:
+def _find_excluded(exclude: Iterable[str]) -> set[str]:
+    return {exclude} if isinstance(exclude, str) else set(map(str, exclude))
+
+
+def _group_by_day(files: Sequence[Path], recipe: Recipe) -> dict[str, list[Path]]:
     """The files of each day, or of each recording that has no calendar day."""
-    days: dict[str, list[str]] = {}
+    days: dict[str, list[Path]] = {}
     for file, name in zip(files, name_recordings(files), strict=True):
-        days.setdefault(find_day(file, recipe) or printable(name), []).append(str(file))
+        days.setdefault(find_day(file, recipe) or printable(name), []).append(file)
     return days
 
 
 def extract_day(
     day: str,
-    files: Sequence[str],
-    out: str,
+    files: Sequence[Path],
+    out: Path,
     settings: EncounterSettings,
     recipe: Recipe,
-    contents: list[Any] | None = None,
+    expected: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Compute one `day` from its `files`, or load it from the folder `out`; return its row of the table.
 
-    `settings` and `recipe` as in `extract_days`.  The files must begin on this day, and have the `contents`
-    in which the area was found, if they are given.  Days share nothing but `out`.
+    `settings` and `recipe` as in `extract_days`.  The files must begin on this day, and be those of the
+    `expected` source, in which the area was found, if it is given.  Days share nothing but `out`.
     """
     start = time.perf_counter()
-    row, folder, paths = (
-        _row(day, files, status="failed"),
-        Path(out),
-        [Path(file) for file in files],
-    )
+    row = _ROW | {"day": day, "status": "failed", "files": len(files)}
     try:
         # Checksums are computed while the files are read.
-        with unchanged_files(paths), ThreadPoolExecutor(1) as thread:
-            source = thread.submit(
+        with unchanged_files(files), ThreadPoolExecutor(1) as thread:
+            described = thread.submit(
                 copy_context().run, describe_source, files, settings, recipe
             )
-            is_stored, status = (folder / f"{day}.parquet").is_file(), "kept"
-            samples = load_day(folder, day, source.result()) if is_stored else None
+            samples = None
+            if (out / f"{day}.parquet").is_file():
+                samples = load_day(out, day, described.result())
+            status = "kept"
             if samples is None:
                 status = "done"
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
-                    samples = find_encounters_in_files(paths, settings, recipe)
-            begins = {find_day(path, recipe) or day for path in paths}
-        if begins != {day} or contents not in (None, source.result()["files"]):
+                    samples = find_encounters_in_files(files, settings, recipe)
+            begins = {find_day(file, recipe) or day for file in files}
+        source = described.result()
+        if begins != {day} or expected not in (None, source):
             raise DataError(
-                f"{paths[0]}: changed after its day or the area was found; extract the day again"
+                f"{files[0]}: changed after its day or the area was found; extract the day again"
             )
-        row["source"] = source.result()
         if status == "done":
             content = samples.to_parquet(index=False)
-            store_cached(folder / f"{day}.parquet", content, source.result())
-        read = [
-            stage
-            for stage in funnels.get(samples)
-            if stage["stage"].startswith("read ")
-        ]
+            store_cached(out / f"{day}.parquet", content, source)
+        read = _add_stages([samples])[0]
         row |= {
             "status": status,
-            "rows": sum(stage["entered"] for stage in read),
-            "unusable": sum(stage["entered"] - stage["kept"] for stage in read),
-            "encounters": int(samples["encounter"].nunique()),
+            "rows": read["entered"],
+            "unusable": read["entered"] - read["kept"],
+            "encounters": samples["encounter"].nunique(),
             "samples": len(samples),
             "why": "; ".join(funnels.warnings(funnels.get(samples))),
+            "source": source,
         }
-    except SzlibError as error:
-        row["why"] = printable(error)
     except Exception as error:  # whatever fails in one day, the others go on
-        row["why"] = printable(f"{type(error).__name__}: {error}")
+        is_known = isinstance(error, SzlibError)
+        row["why"] = printable(
+            error if is_known else f"{type(error).__name__}: {error}"
+        )
     return row | {"seconds": time.perf_counter() - start}
-
-
-def _row(day: str, files: Sequence[str], status: str) -> dict[str, Any]:
-    counts = dict.fromkeys(("rows", "unusable", "encounters", "samples"), 0)
-    row = {"day": day, "status": status, "files": len(files), **counts}
-    return row | {"seconds": 0.0, "why": "", "source": {}}

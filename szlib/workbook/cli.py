@@ -234,7 +234,7 @@ def _inspect(options: argparse.Namespace) -> int:
     with warnings.catch_warnings(
         action="ignore", category=DataWarning
     ):  # the table shows the same counts
-        samples, settings = read_for_encounters(files, settings, reading)
+        samples = read_for_encounters(files, settings, reading)
         if len(samples):
             tracks, area = find_place(samples, settings)
             samples = find_encounters(tracks, settings=replace(settings, area=area))

@@ -29,7 +29,6 @@ from .. import (
 from ..core.files import folder_purpose, write_file
 from ..core.input_files import file_content, printable, read_json_object
 from ..encounters import days as several_days
-from ..encounters.areas import AUTO
 from ..encounters.finding import find_place
 from ..tracks import datasets
 from ..zones.outliers import R_MAX
@@ -140,9 +139,7 @@ def _fit_files(
 ) -> tuple[SocialZone, pd.DataFrame]:
     """Fit a zone to files of tracks: ours to every pair of people, the others to lone encounters."""
     files = datasets.find(paths)
-    area = several_days.known_area(settings, files, reading) or AUTO
-    table = read_tracks(files, recipe=reading)
-    table, place = find_place(table, replace(settings, area=area))
+    table, place = find_place(read_tracks(files, recipe=reading), settings)
     settings = replace(settings, area=place)
     if method in (None, "respect"):
         options: Any = {"kinds": kind, "method": method, "progress": True}

@@ -15,16 +15,17 @@ from helpers.raw_days import (
     assert_streamed_as_whole,
     encounters,
     make_raw_day,
+    read_near,
     write_raw_day,
 )
 
 import szlib
 from szlib.encounters import near_rows
-from szlib.encounters.near_rows import reach_in_cells, read_near_area
+from szlib.encounters.near_rows import select_near
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
-from szlib.tracks.readers import open_file, read_raw
+from szlib.tracks.readers import read_raw
 
 SETTINGS = [
     (szlib.ATC_SQUARE, 3.0, None),
@@ -73,11 +74,10 @@ def test_order_of_rows_does_not_matter(
     shuffled = write_raw_day(
         tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0)
     )
-    in_order = read_near_area(
-        write_raw_day(tmp_path / "a.csv", rows), area=szlib.ATC_SQUARE, duration=1.0
-    )
+    path = write_raw_day(tmp_path / "a.csv", rows)
+    in_order = read_near(path, szlib.ATC_SQUARE, 1.0)
     given = {"duration": 1.0, "space": SPACE}
-    any_order = read_near_area(shuffled, area=szlib.ATC_SQUARE, duration=1.0)
+    any_order = read_near(shuffled, szlib.ATC_SQUARE, 1.0)
     found = encounters(any_order, **given)
     assert len(found) > 0
     pd.testing.assert_frame_equal(encounters(in_order, **given), found)
@@ -98,7 +98,7 @@ def test_gzip_files_and_bad_rows_are_reported_as_by_read_tracks(tmp_path: Path) 
     path.write_bytes(gzip.compress("\n".join(lines).encode()))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        raw = read_near_area(path, area=szlib.ATC_SQUARE, duration=3.0)
+        raw = read_near(path, szlib.ATC_SQUARE)
     with warnings.catch_warnings(record=True) as expected:
         warnings.simplefilter("always")
         whole = read_raw(path)
@@ -141,15 +141,16 @@ def test_damaged_rows_are_rejected_as_by_read_raw(
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
-    with open_file(path, szlib.Recipe()) as (_, scan):
-        found = near_rows.UsableBlocks(scan)
-        rows = pl.concat(found)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        rows = read_near(path, szlib.ATC_SQUARE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)
         whole = read_raw(path)
-    read = funnels.get(whole)[0]
-    assert (found.n_usable, dict(found.reasons)) == (read["kept"], read["rejected"])
-    assert found.first_fault is None or found.first_fault[0] == 31
+    is_rejected = bool(funnels.get(whole)[0]["rejected"])
+    messages = [str(each.message) for each in caught]
+    assert any("first at line 31" in each for each in messages) == is_rejected
+    assert funnels.get(rows)[0] == funnels.get(whole)[0]
     np.testing.assert_array_equal(rows["id"], whole["id"])
     np.testing.assert_array_equal(rows["y"], whole["y"])
 
@@ -157,9 +158,7 @@ def test_damaged_rows_are_rejected_as_by_read_raw(
 def test_area_without_people_gives_an_empty_table(tmp_path: Path) -> None:
     path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=30))
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
-    elsewhere = read_near_area(
-        path, area=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0
-    )
+    elsewhere = read_near(path, szlib.Square(x=(500, 520), y=(500, 520)))
     assert len(elsewhere) == 0
     assert list(elsewhere.columns) == ["day", "id", "t", "x", "y"]
     read, near = funnels.get(elsewhere)
@@ -179,7 +178,7 @@ def test_unreadable_files_raise_as_in_read_tracks(tmp_path: Path) -> None:
     )
     for path in (mostly_bad, in_metres, tmp_path / "missing.csv", tmp_path):
         with pytest.raises(szlib.DataError) as ours:
-            read_near_area(path, area=szlib.ATC_SQUARE, duration=3.0)
+            read_near(path, szlib.ATC_SQUARE)
         with pytest.raises(szlib.DataError) as theirs:
             read_raw(path)
         assert str(ours.value) == str(theirs.value)
@@ -187,12 +186,18 @@ def test_unreadable_files_raise_as_in_read_tracks(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("duration", [0.2, 1.0, 3.0, 10.0])
 @pytest.mark.parametrize("max_gap", [0.2, 0.5, 3.0])
-def test_cells_reach_half_a_second_back_and_a_window_ahead(
+def test_rows_half_a_second_before_and_a_window_after_are_selected(
     duration: float, max_gap: float
 ) -> None:
-    """And one gap farther both ways, to interpolate."""
-    width, before, after = reach_in_cells(duration, max_gap)
-    assert width > max_gap
-    for number, reach in ((before, 0.5), (after, max(duration, 0.5))):
-        needed = reach + max_gap + 0.1
-        assert (number - 1) * width - 1e-9 < needed <= number * width + 1e-9
+    """And one gap farther both ways, to interpolate; but at most three cells more."""
+    t = (np.arange(4000) / 10).round(1)
+    there = pl.DataFrame(
+        {"id": t.astype(int) * 0, "t": t, "x": np.where(t == 200, -10.0, 90.0)}
+    )
+    blocks = there.with_columns(y=pl.lit(0.0)).iter_slices(300)
+    found = pl.concat(select_near(blocks, szlib.ATC_SQUARE, duration, max_gap))["t"]
+    first, last = 200 - 0.5 - max_gap, 200 + max(duration, 0.5) + max_gap
+    assert found.min() <= first and found.max() >= last
+    spare = 3 * (max_gap + 0.1)
+    assert found.min() >= first - spare and found.max() <= last + spare
+    np.testing.assert_allclose(np.diff(found), 0.1, atol=1e-6)

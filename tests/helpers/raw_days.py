@@ -55,13 +55,19 @@ def encounters(raw: pd.DataFrame, **parameters: object) -> pd.DataFrame:
     )
 
 
+def read_near(
+    path: Path, area: object, duration: float = 3.0, max_gap: float | None = None
+) -> pd.DataFrame:
+    """The rows of a file that windows of a `duration` in an `area` can depend on."""
+    settings = szlib.EncounterSettings(area=area, duration=duration)
+    return read_near_area([path], settings, szlib.Recipe(max_gap=max_gap))
+
+
 def assert_streamed_as_whole(
     path: Path, *, square: szlib.Area, duration: float, max_gap: float | None = None
 ) -> int:
     """Check that both ways agree to the last bit, and return the number of samples."""
-    near = read_near_area(
-        path, area=square, duration=duration, recipe=szlib.Recipe(max_gap=max_gap)
-    )
+    near = read_near(path, square, duration, max_gap)
     given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
     streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
     pd.testing.assert_frame_equal(streamed, whole, check_exact=True)

@@ -17,10 +17,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+from helpers.raw_days import read_near
 from helpers.track_files import WRITERS, lines_of, mutate, samples
 
 import szlib
-from szlib.encounters.near_rows import read_near_area
 from szlib.tracks import funnels
 from szlib.tracks.readers import read_raw
 
@@ -93,7 +93,7 @@ def read_damaged(folder: Path, seed: int) -> str:
 
 
 def _streamed(path: Path) -> pd.DataFrame:
-    return read_near_area(path, area=szlib.ATC_SQUARE, duration=3.0)
+    return read_near(path, szlib.ATC_SQUARE)
 
 
 def _outcome(path: Path, read: Callable[[Path], pd.DataFrame]) -> tuple[str, str]:

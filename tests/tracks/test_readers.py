@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from helpers.raw_days import read_near
 from helpers.track_files import (
     BEGIN,
     WRITERS,
@@ -31,7 +32,6 @@ from helpers.track_files import (
 from helpers.track_tables import real_data
 
 import szlib
-from szlib.encounters.near_rows import read_near_area
 from szlib.tracks import funnels
 from szlib.tracks.readers import read_raw
 from szlib.tracks.shapes import SHAPES
@@ -501,7 +501,7 @@ def test_streamed_people_whose_ids_are_too_large_for_floats_stay_two(
     tmp_path: Path,
 ) -> None:
     path = write(tmp_path / "a.csv", as_raw(LARGE.sort_values("t")))
-    near = read_near_area(path, area=szlib.Square((0, 20), (0, 20)), duration=3.0)
+    near = read_near(path, szlib.Square((0, 20), (0, 20)))
     assert set(near["id"]) == {LARGE_ID, LARGE_ID + 1} and len(near) == 40
 
 

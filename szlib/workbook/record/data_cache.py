@@ -21,7 +21,6 @@ from ... import (
     SocialZone,
     ZoneError,
     __version__,
-    as_area,
     find_encounters,
     make_plaza,
     null_encounters,
@@ -30,7 +29,8 @@ from ... import (
 from ...core.files import load_cached, store_cached, write_checksum
 from ...core.input_files import file_content, printable, unchanged_files
 from ...encounters import days
-from ...encounters.areas import place_apart
+from ...encounters.areas import AUTO, place_apart
+from ...encounters.finding import find_place
 from ...encounters.geometry import Area
 from ...tracks import datasets
 from ...zones.social_zone import recorded_hours
@@ -103,13 +103,9 @@ class DataCache:
         """The track table of the data set; recordings that have each their own area stand side by side."""
         settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
-            options = self.method.read_options()
-            tracks = read_tracks(files, recipe=options)
-            return (
-                tracks
-                if days.known_area(settings, files, options)
-                else place_apart(tracks)
-            )
+            tracks = read_tracks(files, recipe=self.method.read_options())
+        area = settings.area or tracks.attrs.get("area", AUTO)
+        return place_apart(tracks) if area == AUTO else tracks
 
     def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
         """The area in which encounters are found: the one given, or the default of the data.
@@ -117,9 +113,10 @@ class DataCache:
         `tracks`, the table of the data, saves reading the files again where the area depends on them.
         """
         settings = self.method.encounter_settings(self.area or None)
-        options = self.method.read_options()
         with self._unchanged_data() as files:
-            return as_area(days.with_area(settings, files, options, tracks).area)
+            if tracks is not None:
+                return find_place(tracks, settings)[1]
+            return days.find_area(files, settings, self.method.read_options())
 
     def encounters(self) -> pd.DataFrame:
         """The encounters that notebook 02 stored, or the same found now."""
