@@ -27,6 +27,8 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..core.errors import DataError
 from ..tracks import funnels
@@ -88,23 +90,27 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
             f"the samples have no column kind; found {list(samples.columns)}; find_encounters gives it"
         )
     selected = samples[samples["kind"].isin(wanted)].copy()
-    counts = samples["kind"].value_counts()
-    rejected = {kind: int(counts[kind]) for kind in KINDS if kind not in wanted}
-    stage = funnels.stage(
-        f"samples: {', '.join(names)}", len(samples), len(selected), rejected
-    )
+    others = [kind for kind in KINDS if kind not in wanted]
+    rejected = {kind: int((samples["kind"] == kind).sum()) for kind in others}
+    name = f"samples: {', '.join(names)}"
+    stage = funnels.stage(name, len(samples), len(selected), rejected)
     return funnels.attach(selected, [*funnels.get(samples), stage])
 
 
-def find_near_pairs(rows: TrackRows, whole: np.ndarray, seconds: float) -> np.ndarray:
-    """Pairs of people who are within `NEAR` [m] at so many `seconds`, or more; their numbers (2, n).
+def find_units(rows: TrackRows, whole: np.ndarray) -> np.ndarray:
+    """Number of the unit of each person: companions, and companions of companions.
 
-    `whole` are those of the `rows` (indices, or a mask) that are at a whole second.
+    `whole` are those of the `rows` at whole seconds at which companions are sought.
     """
     found = find_neighbours(rows.place[whole], rows.moment[whole], NEAR)
     pairs = np.sort(rows.person[whole][np.concatenate(list(found), axis=1)], axis=0)
-    pairs, counts = np.unique(pairs, axis=1, return_counts=True)
-    return np.asarray(pairs[:, counts >= seconds])
+    pairs, seconds = np.unique(pairs, axis=1, return_counts=True)
+    pairs = pairs[:, seconds >= TOGETHER - 1]
+    kinds = kinds_of_pairs(pairs, rows, np.ones(len(rows), bool))
+    a, b = pairs[:, np.asarray(kinds == COMPANIONS)]
+    n = rows.person[-1] + 1
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def kinds_of_pairs(

@@ -29,9 +29,9 @@ from ..core.errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, compute_velocities
 from .finding import find_encounters, find_place
-from .kinds import name_kinds, of_kind
+from .kinds import find_units, name_kinds, of_kind
 from .occupants import TrackRows
-from .pairs import CLOSE, COMPARED, Crowd, find_units
+from .pairs import CLOSE, COMPARED, Crowd
 from .sensor import SensorCheck
 from .settings import EncounterSettings
 
@@ -78,27 +78,17 @@ def time_shifted(
     True
     """
     rows = TrackRows.from_tracks(tracks)
-    shift = _draw_units(rows, _find_leaders(rows), seed, minutes)
+    leader, seconds = _find_leaders(rows)
+    shift = _draw(seconds, minutes, np.random.default_rng(seed))[leader]
     return _move(tracks, rows, shift, rows.recorded)
 
 
-def _find_leaders(rows: TrackRows) -> np.ndarray:
-    """One person of the unit of each person: the first of them."""
+def _find_leaders(rows: TrackRows) -> tuple[np.ndarray, np.ndarray]:
+    """Of each person: the first person of the unit, and the length of the day [s]."""
     unit = find_units(rows, np.flatnonzero(rows.tick % TICKS_PER_SECOND == 0))
-    return np.asarray(np.unique(unit, return_index=True)[1][unit])
-
-
-def _draw_units(
-    rows: TrackRows,
-    leader: np.ndarray,
-    seed: int | Sequence[int],
-    minutes: tuple[float, float],
-) -> np.ndarray:
-    """Draw a shift for each person [s], that of their `leader`."""
-    day = rows.day[np.diff(rows.person, prepend=-1) > 0]
-    seconds = rows.recorded[1][day]
-    drawn = _draw(seconds, minutes, np.random.default_rng(seed))
-    return np.asarray(drawn[leader])
+    leader = np.unique(unit, return_index=True)[1][unit]
+    begins = np.flatnonzero(np.diff(rows.person, prepend=-1))
+    return leader, rows.recorded[1][rows.day[begins]]
 
 
 def _draw(
@@ -233,14 +223,13 @@ def null_encounters(
     settings = replace(settings, area=area)
     kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
     rows = TrackRows.from_tracks(tracks)
-    leader = _find_leaders(rows)
+    leader, seconds = _find_leaders(rows)
     # Encounters depend on nobody who is never in the area.
-    visits = np.isin(rows.person, rows.person[rows.within(area)])
-    visitors = rows.select(visits)
+    visitors = rows.select(np.isin(rows.person, rows.person[rows.within(area)]))
 
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
-        drawn = _draw_units(rows, leader, (seed, shift), minutes)
-        moved = _move(tracks, visitors, drawn, rows.recorded)
+        drawn = _draw(seconds, minutes, np.random.default_rng((seed, shift)))
+        moved = _move(tracks, visitors, drawn[leader], rows.recorded)
         samples = find_encounters(moved, settings=settings, kinds=kinds)
         groups = samples.groupby("encounter", sort=False)
         nearest = groups.agg(kind=("kind", "first"), nearest=("distance", "min"))
@@ -323,19 +312,19 @@ def _search(
     """
     require(shifts >= 1, "shifts", shifts, "at least 1")
     require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
-    first = 0
-    samples: list[pd.DataFrame] = []
-    encounters: list[pd.DataFrame] = []
+    offset, found = 0, []
     for shift in tqdm(range(shifts), unit="shift", disable=None if progress else True):
-        found = [each.assign(shift=shift) for each in find(shift)]
-        for table, parts in zip(found, (samples, encounters), strict=True):
-            parts.append(table.assign(encounter=table["encounter"] + first))
-        first = 1 + encounters[-1]["encounter"].max()
-    stages = funnels.add([funnels.get(part) for part in samples])
-    joined = [pd.concat(each, ignore_index=True) for each in (samples, encounters)]
+        samples, encounters = (
+            each.assign(shift=shift, encounter=each["encounter"] + offset)
+            for each in find(shift)
+        )
+        found.append((samples, encounters))
+        offset = encounters["encounter"].to_numpy().max(initial=offset - 1) + 1
+    all_samples, all_encounters = zip(*found, strict=True)
+    table = pd.concat(all_samples, ignore_index=True)
     return NullEncounters(
-        funnels.attach(joined[0], stages),
-        joined[1],
+        funnels.attach(table, funnels.add(map(funnels.get, all_samples))),
+        pd.concat(all_encounters, ignore_index=True),
         shifts,
         float(r_max),
         parameters,

@@ -22,8 +22,6 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..core.checks import require
 from ..core.errors import DataError
@@ -39,10 +37,8 @@ from .kinds import (
     REACH,
     SAME,
     STANDING,
-    TOGETHER,
     classify_motion,
-    find_near_pairs,
-    kinds_of_pairs,
+    find_units,
     name_kinds,
     of_kind,
 )
@@ -114,10 +110,8 @@ def find_pairs(
     crowd = Crowd.from_tracks(tracks, place)
     met = crowd.meet(r_max)
     samples = crowd.sample(tracks, met, np.arange(len(met.kind)), r_max)
-    samples["third"] = met.third[samples["encounter"]]
     samples.attrs |= {"area": str(place), "area_reason": place.reason}
-    stage = funnels.stage("pairs: samples", len(samples), len(samples), {})
-    return of_kind(funnels.attach(samples, [*funnels.get(tracks), stage]), kinds)
+    return of_kind(funnels.attach(samples, funnels.get(tracks)), kinds)
 
 
 def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
@@ -130,19 +124,6 @@ def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
         f"pairs who come towards each other or cross, within {CLOSE:g} m: {n:,}\n"
         f"sensor: it {loses if resolved else 'resolves people at every distance'}: {crowd.sensor}"
     )
-
-
-def find_units(rows: TrackRows, whole: np.ndarray) -> np.ndarray:
-    """Number of the unit of each person: companions, and companions of companions.
-
-    `whole` are those of the `rows` at whole seconds at which companions are sought.
-    """
-    pairs = find_near_pairs(rows, whole, TOGETHER - 1)
-    kinds = kinds_of_pairs(pairs, rows, np.ones(len(rows), bool))
-    a, b = pairs[:, np.asarray(kinds == COMPANIONS)]
-    n = rows.person[-1] + 1
-    graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 @dataclass(frozen=True, eq=False)

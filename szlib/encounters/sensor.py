@@ -19,7 +19,6 @@ within 0.6 m is found; of the 500 passes of crowds that walk straight on, or swe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -134,13 +133,11 @@ def count_ends(
     np.minimum.at(nearest, one, distance)
     np.minimum.at(nearest, other, distance)
     ends, samples = nearest[is_end], nearest[inside]
-    resolved, n = 0.0, len(ends)
-    for low, high in pairwise(_EDGES):
-        near, expected = ((low <= d) & (d < high) for d in (ends, samples))
-        k = int(near.sum())
-        least = beta.ppf(_SMALL, k, n - k + 1) if k >= _FEWEST else 0.0
-        if least > _MOST * _share(expected):
-            resolved = float(high)
+    n, (near, common) = len(ends), (np.histogram(d, _EDGES)[0] for d in (ends, samples))
+    expected = common / max(len(samples), 1)
+    least = beta.ppf(_SMALL, near, n - near + 1)
+    is_lost = (near >= _FEWEST) & (least > _MOST * expected)
+    resolved = float(_EDGES[1:][is_lost].max(initial=0.0))
     low, high = _interval_of_share(int((ends < NEAR_END).sum()), n)
     return {
         "ends": n,
