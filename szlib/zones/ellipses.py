@@ -95,27 +95,22 @@ class Ellipse:
         """The foci and the semi-major axis, (xa, ya, xb, yb, a) [m]: the input of the distance formula."""
         return (*self.foci.ravel().tolist(), self.semi_axes[0])
 
+    @property
+    def _axes(self) -> Array:
+        """Unit vectors along the major and the minor axis, shape (2, 2)."""
+        cosine, sine = unit_vectors(self.angle)
+        return np.array([[cosine, sine], [-sine, cosine]])
+
     def level(self, points: ArrayLike) -> Array:
         """Left side of the ellipse equation at `points` (..., 2) [m]: 1 on the curve, less inside."""
-        d, cosine, sine = (
-            np.asarray(points, float) - self.center,
-            np.cos(self.angle),
-            np.sin(self.angle),
-        )
-        u = (d[..., 0] * cosine + d[..., 1] * sine) / self.semi_axes[0]
-        v = (d[..., 1] * cosine - d[..., 0] * sine) / self.semi_axes[1]
-        return np.asarray(u**2 + v**2)
+        offset = np.asarray(points, float) - self.center
+        along = (offset[..., None, :] * self._axes).sum(axis=-1)
+        return np.asarray(((along / self.semi_axes) ** 2).sum(axis=-1))
 
     def curve(self, n: int = 200) -> Array:
         """`n` points on the curve, shape (n, 2) [m]; the last repeats the first."""
-        phi, cosine, sine = (
-            np.linspace(0, 2 * np.pi, n),
-            np.cos(self.angle),
-            np.sin(self.angle),
-        )
-        u, v = self.semi_axes[0] * np.cos(phi), self.semi_axes[1] * np.sin(phi)
-        x, y = self.center
-        return np.stack([x + u * cosine - v * sine, y + u * sine + v * cosine], axis=-1)
+        along = unit_vectors(np.linspace(0, 2 * np.pi, n)) * self.semi_axes
+        return np.asarray(self.center + along @ self._axes)
 
     def scaled(self, scale: float) -> Ellipse:
         """This ellipse of a person's frame, enlarged by the factor `scale` about the person."""
@@ -184,7 +179,8 @@ class EllipseZone:
         share = (speed - speeds[0]) / (speeds[1] - speeds[0])
         weights = (1 - share, share)
         center = np.average([e.center for e in ends], axis=0, weights=weights)
-        matrix = np.average([_matrix(e) for e in ends], axis=0, weights=weights)
+        matrices = [(e._axes.T * np.square(e.semi_axes)) @ e._axes for e in ends]
+        matrix = np.average(matrices, axis=0, weights=weights)
         squares, axes = np.linalg.eigh(matrix)
         b, a = np.sqrt(squares)
         return Ellipse(tuple(center), (a, b), np.arctan2(axes[1, 1], axes[0, 1]))
@@ -192,10 +188,8 @@ class EllipseZone:
     def boundary(self, speed: float, theta: ArrayLike) -> Array:
         """Boundary at a `speed` [m/s] in the directions `theta` (...) [rad], shape (..., 2) [m]."""
         directions = np.asarray(theta, float)
-        reach = ellipse_reach(self.ellipse(speed).parameters, directions.ravel())
-        return np.asarray(
-            reach.reshape(directions.shape)[..., None] * unit_vectors(theta)
-        )
+        reach = ellipse_reach(self.ellipse(speed).parameters, directions)
+        return reach.reshape(*directions.shape, 1) * unit_vectors(directions)
 
 
 def find_neighbours(speeds: Iterable[float], speed: float) -> list[float]:
@@ -203,12 +197,6 @@ def find_neighbours(speeds: Iterable[float], speed: float) -> list[float]:
     known = sorted(speeds)
     below, above = [v for v in known if v <= speed], [v for v in known if v >= speed]
     return sorted({*below[-1:], *above[:1]})
-
-
-def _matrix(ellipse: Ellipse) -> Array:
-    """The shape matrix of an `ellipse`, R diag(a^2, b^2) R^T, shape (2, 2) [m2]."""
-    axes = unit_vectors(ellipse.angle + np.array([0, np.pi / 2]))
-    return np.asarray((axes.T * np.square(ellipse.semi_axes)) @ axes)
 
 
 def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:
@@ -231,6 +219,7 @@ def unit_vectors(theta: ArrayLike) -> Array:
     return np.stack([np.cos(theta), np.sin(theta)], axis=-1)
 
 
+@lru_cache(maxsize=256)
 def circle_around(zone: Ellipse) -> Ellipse:
     """The smallest circle around a person that contains the person's `zone` for every heading.
 
@@ -248,21 +237,13 @@ def circle_around(zone: Ellipse) -> Ellipse:
     >>> round(circle_around(Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))).semi_axes[0], 6)
     1.1
     """
-    radius = _greatest_distance(zone.center, zone.semi_axes, zone.angle)
-    return Ellipse((0.0, 0.0), (radius, radius))
-
-
-@lru_cache(maxsize=256)
-def _greatest_distance(
-    center: tuple[float, float], semi_axes: tuple[float, float], angle: float
-) -> float:
-    """Greatest distance from the origin to an ellipse [m], by bisection."""
-    (m, n), (a, b) = center, semi_axes
-    c, s = cos(angle), sin(angle)
+    (m, n), (a, b) = zone.center, zone.semi_axes
+    c, s = cos(zone.angle), sin(zone.angle)
     p, q = abs(m * c + n * s), abs(n * c - m * s)
     low, high = 0.0, pi / 2
     for _ in range(_BISECTIONS):
         t = (low + high) / 2
         rises = b * q * cos(t) - a * p * sin(t) - (a**2 - b**2) * sin(t) * cos(t) > 0
         low, high = (t, high) if rises else (low, t)
-    return hypot(p + a * cos(low), q + b * sin(low))
+    radius = hypot(p + a * cos(low), q + b * sin(low))
+    return Ellipse((0.0, 0.0), (radius, radius))

@@ -8,7 +8,7 @@ some geometrical aspects of D-optimality", Biometrika 62, 1975).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -35,16 +35,12 @@ _ZOOM, _N_ZOOMS = (8, 9)
 _MAX_ROUNDS = 50  # exchanges with a curve; a smooth curve needs about six
 
 
-def minimum_enclosing_ellipse(
-    points: ArrayLike, *, start: Sequence[int] = ()
-) -> Ellipse:
+def minimum_enclosing_ellipse(points: ArrayLike) -> Ellipse:
     """Find the smallest-area ellipse that encloses all points, exact up to rounding (paper, sec. 2).
 
     Parameters
     ----------
     points : shape (n, 2) [m]. Duplicates and points inside do not change the result.
-    start : indices of three or more points, not on a line, that probably determine the ellipse. A good
-        guess saves time and does not change the result.
 
     Returns
     -------
@@ -69,7 +65,7 @@ def minimum_enclosing_ellipse(
     >>> [round(axis, 6) for axis in ellipse.semi_axes]  # the circle through the corners
     [1.414214, 1.414214]
     """
-    return _enclose(check_points(points, "x, y", 3), list(start))[0]
+    return _enclose(check_points(points, "x, y", 3))[0]
 
 
 def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> Ellipse:

@@ -97,11 +97,8 @@ class Slice:
     def reach(self, theta: ArrayLike) -> Array:
         """R'(theta), the distance from the origin to the polygon's edge; same shape as `theta` [m]."""
         normals, offsets = self._edges()
-        theta = np.asarray(theta, float)
-        along = (
-            np.cos(theta)[..., None] * normals[:, 0]
-            + np.sin(theta)[..., None] * normals[:, 1]
-        )
+        # a product of matrices would differ in the last bit, and the ellipse around it in the eighth digit
+        along = (unit_vectors(theta)[..., None, :] * normals).sum(axis=-1)
         return _reach(along, offsets)
 
     def boundary(self, theta: ArrayLike) -> Array:
@@ -113,9 +110,7 @@ class Slice:
     def _edges(self) -> tuple[Array, Array]:
         """Outward unit normals (k, 2) and distances from the origin (k,) of the polygon's edges."""
         along = np.roll(self.polygon, -1, axis=0) - self.polygon
-        normals = (
-            np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
-        )
+        normals = along[:, ::-1] * [1, -1] / np.hypot(*along.T)[:, None]
         return normals, np.einsum("ij,ij->i", normals, self.polygon)
 
 
@@ -149,8 +144,9 @@ def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
         )
     pairs = np.sort(hull.simplices, axis=1)[:, [[0, 1], [0, 2], [1, 2]]]
     edges = np.unique(pairs.reshape(-1, 2), axis=0)
-    i, j = edges[(v[edges[:, 0]] - speed) * (v[edges[:, 1]] - speed) <= 0].T
-    i, j = i[v[i] != v[j]], j[v[i] != v[j]]
+    slowest, fastest = np.sort(v[edges], axis=1).T
+    is_cut = (slowest <= speed) & (speed <= fastest) & (slowest < fastest)
+    i, j = edges[is_cut].T
     share = ((speed - v[i]) / (v[j] - v[i]))[:, None]
     section = hull.points[i, :2] + share * (hull.points[j, :2] - hull.points[i, :2])
     try:
@@ -276,22 +272,13 @@ class HullEstimator(Estimator):
         """
         ellipses = np.full((len(weights), len(speeds), 5), np.nan)
         unit = unit_vectors(DIRECTIONS)
-        start: dict[int, list[int]] = {}
         for i, weight in enumerate(weights):
             with suppress(ZoneError):
-                reach = _hull_reach(
-                    _convex_hull(self.points[weight[self.number] > 0]), unit, speeds
-                )
-                for j in map(int, np.flatnonzero(np.isfinite(reach).all(axis=1))):
+                hull = _convex_hull(self.points[weight[self.number] > 0])
+                reach = _hull_reach(hull, unit, speeds)
+                for j in np.flatnonzero(np.isfinite(reach).all(axis=1)):
                     boundary = (self.r_max - reach[j])[:, None] * unit
-                    ellipse = minimum_enclosing_ellipse(
-                        boundary, start=start.get(j, [])
-                    )
-                    ellipses[i, j] = ellipse.parameters
-                    is_support = (
-                        (boundary[:, None] == ellipse.support).all(axis=-1).any(axis=1)
-                    )
-                    start[j] = np.flatnonzero(is_support).tolist()
+                    ellipses[i, j] = minimum_enclosing_ellipse(boundary).parameters
         return ellipses
 
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 from ..core.checks import require
 from ..core.errors import ZoneError
@@ -44,7 +42,7 @@ class ReferenceZone:
 
     name: str
     ellipse: Ellipse
-    intervals: dict[str, tuple[float, float]]
+    intervals: dict[str, list[float]]
     n_encounters: int
     method: str
     verdict: Verdict
@@ -72,20 +70,9 @@ def reference_zone(name: str) -> ReferenceZone:
     >>> hall.ellipse.semi_axes, str(hall.verdict)
     ((1.2, 1.2), 'undecided')
     """
-    zones = _load()
+    zones = json.loads(FILE.read_text(encoding="utf-8"))
     require(name in zones, "name", name, f"one of {', '.join(zones)}", ZoneError)
     entry = zones[name]
-    return ReferenceZone(
-        name=name,
-        ellipse=Ellipse(**entry["ellipse"]),
-        intervals={
-            quantity: tuple(ends) for quantity, ends in entry["intervals"].items()
-        },
-        verdict=Verdict(entry["verdict"], entry["reasons"]),
-        **{key: entry[key] for key in ("n_encounters", "method", "source", "cite")},
-    )
-
-
-@cache
-def _load() -> dict[str, Any]:
-    return dict(json.loads(FILE.read_text(encoding="utf-8")))
+    verdict = Verdict(entry["verdict"], entry.pop("reasons"))
+    ellipse = Ellipse(**entry["ellipse"])
+    return ReferenceZone(name, **{**entry, "ellipse": ellipse, "verdict": verdict})

@@ -96,32 +96,26 @@ def collect_approaches(
     ZoneError : no encounter of the data or of the null model came so near.
     """
     check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
-    model = null.encounters
-    if smooth:
-        samples, stored = (
-            each.assign(distance=smooth_paths(each)[1])
-            for each in (samples, null.samples)
-        )
-        model = nearest_approaches(stored).rename(columns={"distance": "nearest"})
-    data = nearest_approaches(samples).rename(columns={"distance": "nearest"})
-    has_kinds = "kind" in data and "kind" in model
-    columns = ["encounter", "nearest", "shift", *(["kind"] if has_kinds else [])]
-    counted = [
-        each.loc[
-            (each["nearest"] >= excluded_below) & (each["nearest"] < null.r_max),
-            columns,
-        ]
-        for each in (data.assign(shift=-1), model)
-    ]
-    if not all(map(len, counted)):
+
+    def find_nearest(table: pd.DataFrame) -> pd.DataFrame:
+        if smooth:
+            table = table.assign(distance=smooth_paths(table)[1])
+        return nearest_approaches(table).rename(columns={"distance": "nearest"})
+
+    data = find_nearest(samples).assign(shift=-1)
+    model = find_nearest(null.samples) if smooth else null.encounters
+    both = pd.concat([data, model], join="inner", ignore_index=True)
+    found = both[(both["nearest"] >= excluded_below) & (both["nearest"] < null.r_max)]
+    n = int((found["shift"] == -1).sum())
+    n_null = len(found) - n
+    if not (n and n_null):
         raise ZoneError(
-            f"{len(counted[0])} encounters of the data and {len(counted[1])} of the null model came "
-            f"within {excluded_below:g} to {null.r_max:g} m: nothing to test; add data, or more shifts"
+            f"{n} encounters of the data and {n_null} of the null model came within {excluded_below:g} to "
+            f"{null.r_max:g} m: nothing to test; add data, or more shifts"
         )
-    both = pd.concat(counted, ignore_index=True)
-    kind = both["kind"].astype(object) if has_kinds else both["shift"] * 0
+    kind = found.get("kind", pd.Series("", found.index)).astype(object)
     number = pd.factorize(kind, use_na_sentinel=False)[0]
-    return both.assign(kind=number, shift=1 + both["shift"])
+    return found[["encounter", "nearest"]].assign(shift=1 + found["shift"], kind=number)
 
 
 @dataclass(frozen=True)
