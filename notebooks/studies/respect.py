@@ -227,7 +227,8 @@ def describe_site(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, f
     test = szlib.null_test(data, null)
     bodies = szlib.null_test(data, null, excluded_below=0.5)
     few = max(1, min(null.shifts, HULLS * null.shifts // max(len(null.samples), 1)))
-    hulls = [hull_a(null.one(k)) for k in range(few)]
+    by_shift = null.samples[null.samples["shift"] < few].groupby("shift")
+    hulls = [hull_a(samples) for _, samples in by_shift]
     return {
         "encounters": data["encounter"].nunique(),
         "within_2m": test.n_encounters,

@@ -168,11 +168,8 @@ def _check_windows(
     Both people are tracked, the conditions hold `throughout`, and no two windows of one person overlap.
     """
     last = np.minimum(first + steps, len(rows) - 1)
-    tracked = np.ones(len(first), bool)
-    for start in (first, other[first]):
-        end = np.minimum(start + steps, len(rows) - 1)
-        tracked &= rows.piece[end] == rows.piece[start]
-        tracked &= rows.tick[end] - rows.tick[start] == steps
+    both, piece = np.stack([first, other[first]]), np.r_[rows.piece, -np.ones(steps)]
+    tracked = (piece[both + steps] == piece[both]).all(axis=0)
     found = {"a track ends within the window": tracked}
     for reason, condition in throughout.items():
         failures = np.cumsum(~condition)  # the opening itself was checked

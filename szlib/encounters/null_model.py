@@ -148,8 +148,8 @@ class NullEncounters:
     >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(plaza)
     >>> null = szlib.null_encounters(tracks, shifts=2, minutes=(0.2, 1), progress=False)
-    >>> len(null.one(0)) + len(null.one(1)) == len(null.samples)
-    True
+    >>> sorted(null.encounters["shift"].unique().tolist())
+    [0, 1]
     """
 
     samples: pd.DataFrame
@@ -159,20 +159,12 @@ class NullEncounters:
     parameters: dict[str, Any] = field(default_factory=dict)
     sensor: SensorCheck | None = None
 
-    def one(self, shift: int) -> pd.DataFrame:
-        """The samples of one `shift` (its number), to be treated like those of the data."""
-        require(
-            0 <= shift < self.shifts, "shift", shift, f"from 0 to {self.shifts - 1}"
-        )
-        return self.samples[self.samples["shift"] == shift]
-
     def of_kind(self, kinds: str | Iterable[str] | None) -> NullEncounters:
         """The encounters of some `kinds`, as `szlib.of_kind`: treat data and null model alike."""
-        kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
+        names = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
+        samples, encounters = self.samples, self.encounters
         return replace(
-            self,
-            samples=of_kind(self.samples, kinds),
-            encounters=of_kind(self.encounters, kinds),
+            self, samples=of_kind(samples, names), encounters=of_kind(encounters, names)
         )
 
 
@@ -221,7 +213,6 @@ def null_encounters(
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     tracks, area = find_place(tracks, settings)
     settings = replace(settings, area=area)
-    kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
     rows = TrackRows.from_tracks(tracks)
     leader, seconds = _find_leaders(rows)
     # Encounters depend on nobody who is never in the area.
@@ -230,17 +221,18 @@ def null_encounters(
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
         drawn = _draw(seconds, minutes, np.random.default_rng((seed, shift)))
         moved = _move(tracks, visitors, drawn[leader], rows.recorded)
-        samples = find_encounters(moved, settings=settings, kinds=kinds)
+        samples = find_encounters(moved, settings=settings)
         groups = samples.groupby("encounter", sort=False)
         nearest = groups.agg(kind=("kind", "first"), nearest=("distance", "min"))
         is_near, far = samples["distance"] <= r_max, f"farther than {r_max} m"
         close = funnels.select(samples, is_near, "samples: close", far)
         return close, nearest.reset_index()
 
-    made_by = {"moved": "units", "shifts": shifts, "seed": seed, "kinds": kinds}
+    made_by = {"moved": "units", "shifts": shifts, "seed": seed}
     parameters = {**made_by, "minutes": list(minutes), **settings.as_json()}
     sensor = Crowd.from_tracks(tracks, area).sensor
-    return _search(find, shifts, r_max, parameters, sensor, progress)
+    null = _search(find, shifts, r_max, parameters, sensor, progress)
+    return null.of_kind(kinds)
 
 
 def null_pairs(

@@ -627,7 +627,7 @@ def test_plain_loops_agree_on_the_real_day(real_tracks: pd.DataFrame) -> None:
 
 
 def test_the_papers_conditions_are_the_defaults() -> None:
-    assert szlib.EncounterSettings.paper() == szlib.EncounterSettings()
-    assert szlib.EncounterSettings.paper("0 12 0 8").area == szlib.Square(
-        (0, 12), (0, 8)
-    )
+    """A space of 4 m x 5 m, 3 s, 1 m, 0.4 m/s (sec. 2)."""
+    space = szlib.AttentionalSpace(length=5.0, width=4.0)
+    papers = {"space": space, "duration": 3.0, "min_distance": 1.0, "min_speed": 0.4}
+    assert szlib.EncounterSettings(**papers) == szlib.EncounterSettings()

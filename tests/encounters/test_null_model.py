@@ -45,7 +45,9 @@ def test_each_shift_equals_encounters_of_the_shifted_day(
             .reset_index(drop=True)
         )
         found = (
-            null.one(shift).drop(columns=["encounter", "shift"]).reset_index(drop=True)
+            null.samples[null.samples["shift"] == shift]
+            .drop(columns=["encounter", "shift"])
+            .reset_index(drop=True)
         )
         pd.testing.assert_frame_equal(found, expected)
 
@@ -98,7 +100,6 @@ def test_null_model_without_encounters_is_empty() -> None:
     )
     assert len(null.samples) == len(null.encounters) == 0
     assert null.shifts == 3
-    assert len(null.one(2)) == 0
 
 
 def test_invalid_arguments_raise(
@@ -106,8 +107,6 @@ def test_invalid_arguments_raise(
 ) -> None:
     with pytest.raises(DataError, match="shifts must be at least 1"):
         szlib.null_encounters(tracks, shifts=0)
-    with pytest.raises(DataError, match="from 0 to 6; got 7"):
-        null.one(7)
     with pytest.raises(DataError, match=r"unknown parameter \['min_distanse'"):
         szlib.null_encounters(tracks, shifts=1, progress=False, min_distanse=1.0)
 
