@@ -281,8 +281,8 @@ def null_pairs(
         counted = stored = met.compared
         if len(counted) > (quota := -(-_STORED // shifts)):
             stored = np.sort(rng.choice(counted, quota, replace=False))
-        table = {"encounter": counted, "kind": name_kinds(met.kind[counted])}
-        every = pd.DataFrame(table | {"nearest": met.nearest[counted]})
+        kind, nearest = name_kinds(met.kind[counted]), met.nearest[counted]
+        every = pd.DataFrame({"encounter": counted, "kind": kind, "nearest": nearest})
         return crowd.sample(tracks, met, stored, r_max), every
 
     made_by = {"minutes": list(minutes), "kinds": list(COMPARED), "area": str(place)}

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import beta, binom
+from scipy.stats import beta, quantile_test
 
 from .occupants import TrackRows
 
@@ -130,8 +130,8 @@ def count_ends(
     recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
     is_end = (np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded
     nearest, distance = np.full(len(rows), np.inf), rows.distance(one, other)
-    np.minimum.at(nearest, one, distance)
-    np.minimum.at(nearest, other, distance)
+    for each in (one, other):
+        np.minimum.at(nearest, each, distance)
     ends, samples = nearest[is_end], nearest[inside]
     n, (near, common) = len(ends), (np.histogram(d, _EDGES)[0] for d in (ends, samples))
     expected = common / max(len(samples), 1)
@@ -165,12 +165,11 @@ def measure_noise(rows: TrackRows, inside: np.ndarray) -> dict[str, Any]:
     )
     of_person = pd.Series(variance).groupby(rows.person[at]).agg(["mean", "size"])
     is_measured = of_person["size"] >= _FEWEST_KNOTS
-    errors = np.sort(np.sqrt(of_person["mean"][is_measured]))
+    errors = np.sqrt(of_person["mean"][is_measured])
     if len(errors) <= _FEWEST:
         return {}
-    ends = binom.ppf([0.025, 0.975], len(errors), 0.5).astype(int)
-    low, high = errors[np.clip(ends - np.array([1, 0]), 0, len(errors) - 1)].tolist()
-    return {"noise": float(np.median(errors)), "noise_low": low, "noise_high": high}
+    low, high = quantile_test(errors, p=0.5).confidence_interval(0.95)
+    return {"noise": float(errors.median()), "noise_low": low, "noise_high": high}
 
 
 def _same_piece(rows: TrackRows, at: np.ndarray, reach: int) -> np.ndarray:
