@@ -77,15 +77,15 @@ def find_encounters(
     tracks, area = find_place(tracks, settings)
     rows, steps = TrackRows.from_tracks(tracks), settings.steps
     at_opening, throughout, other = _check_rows(rows, area, settings)
-    first, missed = _apply_conditions(np.arange(len(rows)), at_opening)
-    conditions = _check_windows(rows, first, other, steps, throughout)
-    chosen, rejected = _apply_conditions(np.arange(len(first)), conditions)
+    first, missed = _apply_conditions(at_opening)
+    windows = _check_windows(rows, first, other, steps, throughout)
+    chosen, rejected = _apply_conditions(windows)
     ref = first[chosen]
 
     pairs = np.stack([ref, other[ref]])
-    windows = (pairs[..., None] + np.arange(steps + 1)).reshape(2, -1)
+    sampled = (pairs[..., None] + np.arange(steps + 1)).reshape(2, -1)
     number = np.arange(len(ref)).repeat(steps + 1)
-    samples = sample_rows(tracks, rows, number, *windows)
+    samples = sample_rows(tracks, rows, number, *sampled)
     counts = rows.within(area.grown(REACH))
     samples["kind"] = kinds_of_pairs(rows.person[pairs], rows, counts)[number]
     samples.attrs |= {"area": str(area), "area_reason": area.reason}
@@ -188,13 +188,9 @@ def _drop_overlaps(first: np.ndarray, valid: np.ndarray, steps: int) -> np.ndarr
     return taken
 
 
-def _apply_conditions(
-    rows: np.ndarray, conditions: Conditions
-) -> tuple[np.ndarray, dict[str, int]]:
+def _apply_conditions(conditions: Conditions) -> tuple[np.ndarray, dict[str, int]]:
     """The rows that meet all conditions, and how many rows each condition was the first to reject."""
-    reasons: dict[str, int] = {}
-    for reason, condition in conditions.items():
-        passing = rows[condition[rows]]
-        reasons[reason] = len(rows) - len(passing)
-        rows = passing
-    return rows, reasons
+    met = np.stack(list(conditions.values()))
+    kept = met.all(axis=0)
+    first = np.bincount(met.argmin(axis=0)[~kept], minlength=len(met))
+    return np.flatnonzero(kept), dict(zip(conditions, first.tolist(), strict=True))
