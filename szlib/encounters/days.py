@@ -12,7 +12,7 @@ import io
 import json
 import time
 import warnings
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
@@ -63,7 +63,7 @@ _VERSION = 9
 # purpose of an extraction's folder, as its marker states it
 PURPOSE = "encounters by day"
 _READ = "read all files"  # the first stage of the funnel of many days
-# Columns of the table of days, with the values of an excluded day.
+# a row of the table of days, of an excluded one
 _ROW: dict[str, Any] = {
     "day": "",
     "status": "excluded",
@@ -77,24 +77,14 @@ _ROW: dict[str, Any] = {
 }
 
 
-def find_encounters_in_files(
-    files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
-) -> pd.DataFrame:
-    """Find the encounters of the `files` of one day: the same as in ``szlib.read_tracks(files)``.
-
-    `settings` say what counts as an encounter, `recipe` how the files are read.  Raises DataError also where
-    a file changes meanwhile.
-    """
-    tracks = read_for_encounters(files, settings, recipe)
-    if len(tracks) == 0:
-        return funnels.attach(no_samples(), funnels.get(tracks))
-    return find_encounters(tracks, settings=settings)
-
-
 def read_for_encounters(
     files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
 ) -> pd.DataFrame:
-    """The tracks on which encounters in the `files` of one day depend; arguments as above."""
+    """The tracks on which encounters in the `files` of one day depend.
+
+    `settings` say what counts as an encounter, `recipe` how the files are read.  `szlib.find_encounters`
+    finds the same encounters in them as in ``szlib.read_tracks(files)``.
+    """
     raw = read_near_area(files, settings, recipe)
     return to_clock(raw, max_gap=recipe.max_gap) if len(raw) else raw
 
@@ -113,7 +103,8 @@ def find_area(
         return as_area(areas.pop())
     # Reading the day itself warns of rejected rows.
     with warnings.catch_warnings(action="ignore", category=DataWarning):
-        return find_place(read_tracks(files, recipe=recipe), settings)[1]
+        tracks = read_tracks(files, recipe=recipe)
+    return find_place(tracks, settings)[1]
 
 
 def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
@@ -121,15 +112,15 @@ def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
     and what to do."""
     if len(samples):
         return samples
-    stages = [stage for stage in funnels.get(samples) if stage["entered"]]
-    emptied = next((stage for stage in stages if not stage["kept"]), None)
+    entered = [stage for stage in funnels.get(samples) if stage["entered"]]
+    emptied = next((stage for stage in entered if not stage["kept"]), None)
     if emptied is None:
         raise DataError(
             "the table of samples is empty, and has no funnel that says why"
         )
     rejected = emptied["rejected"]
     rows = ", ".join(f"{count:,} {reason}" for reason, count in rejected.items())
-    last = [*rejected][-1]
+    *_, last = rejected
     advice = next(text for words, text in _ADVICE.items() if words in last)
     raise DataError(
         f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
@@ -179,7 +170,8 @@ class Extraction:
     table : one row a day: day, status ("done" now, "kept" from before, "excluded", "failed"), files, rows
         read, unusable rows among them, encounters, samples, seconds, and why a day failed, or what is
         implausible in it.
-    settings, recipe : what counted as an encounter, and how the files were read.
+    settings : what counted as an encounter.  Its area is the same in every day; else it is "auto" or None.
+    recipe : how the files were read.
     sources : what the result of each finished day is made of: content, parameters and version.
     exclude : days that were left out.
 
@@ -198,7 +190,7 @@ class Extraction:
     settings: EncounterSettings
     recipe: Recipe
     sources: Mapping[str, Mapping[str, Any]]
-    exclude: Collection[str]
+    exclude: set[str]
 
     @classmethod
     def load(cls, out: str | Path, *, exclude: Iterable[str] = ()) -> Extraction:
@@ -209,42 +201,35 @@ class Extraction:
         DataError : the folder holds no extracted days, or they differ in settings or version; or none is
             left, or a day is damaged.
         """
-        folder, excluded = Path(out), _find_excluded(exclude)
+        folder, excluded = Path(out), set(map(str, exclude))
         if folder_purpose(folder) != PURPOSE:
             raise DataError(
                 f"{folder}: holds no extracted days; expected a folder of `szlib extract`"
             )
-        stored = {
-            file.name.removesuffix(".parquet.json"): file
-            for file in folder.glob("*.parquet.json")
-        }
         sources: dict[str, dict[str, Any]] = {}
-        for day in sorted(stored.keys() - excluded):
+        for file in sorted(folder.glob("*.parquet.json")):
+            day = file.name.removesuffix(".parquet.json")
+            if day in excluded:
+                continue
             expected = "one of this version; extract the day again"
-            with reading(stored[day], "as an extracted day", expected):
-                sources[day] = json.loads(read_small(stored[day]))["made_of"]
+            with reading(file, "as an extracted day", expected):
+                sources[day] = json.loads(read_small(file))["made_of"]
                 parameters = dict(sources[day]["parameters"])
                 recipe = Recipe(**parameters.pop("recipe"))
                 space = AttentionalSpace(**parameters.pop("space"))
                 settings = EncounterSettings(space=space, **parameters)
-        if not sources:
-            raise DataError(
-                f"{folder}: no day is left; all of {', '.join(sorted(stored))} are excluded"
-            )
-        first, *others = sources
-        for day in others:
+            first = next(iter(sources))
             if sources[day] | {"files": None} != sources[first] | {"files": None}:
                 raise DataError(
                     f"{folder}: {day} was extracted with other settings than {first}, or another version; "
                     "extract all days again, or exclude it"
                 )
+        if not sources:
+            raise DataError(
+                f"{folder}: no day is left; expected one besides those excluded, {sorted(excluded)}"
+            )
         table = pd.DataFrame({"day": list(sources), "status": "kept"})
         return cls(folder, table, settings, recipe, sources, excluded)
-
-    @property
-    def area(self) -> Area | None:
-        """Where encounters were searched, the same in every day; None where each has its own, or none."""
-        return self.settings.area if isinstance(self.settings.area, Area) else None
 
     @property
     def failed(self) -> pd.DataFrame:
@@ -262,18 +247,19 @@ class Extraction:
         ------
         DataError : no day is finished, or another run has since replaced a result in the folder.
         """
+        if not self.sources:
+            raise DataError(f"no day was finished in {self.out}; see the table: {self}")
         parts = {}
-        for day in sorted(self.sources):
-            part = load_day(self.out, day, self.sources[day])
+        for day, source in sorted(self.sources.items()):
+            part = load_day(self.out, day, source)
             if part is None:
                 raise DataError(
                     f"{self.out / day}.parquet: is not the result of this extraction (another run, other "
                     "data or parameters, or damage); extract again, into another folder"
                 )
-            parts[day] = part.astype({"day": str})
-        if not parts:
-            raise DataError(f"no day was finished in {self.out}; see the table: {self}")
+            parts[day] = part
         samples = pd.concat(parts, names=["file"]).reset_index("file")
+        samples["day"] = samples["day"].astype(str)
         samples = samples[~samples["day"].isin(self.exclude)].reset_index(drop=True)
         samples["encounter"] = samples.groupby(
             ["file", "encounter"], sort=False
@@ -286,9 +272,10 @@ class Extraction:
     def __str__(self) -> str:
         shown = self.table.to_string(index=False, float_format="{:.1f}".format)
         statuses = self.table["status"].value_counts().sort_index()
-        counts = ", ".join(f"{n} {status}" for status, n in statuses.items())
-        area = f"; area: {self.area} {self.area.reason}".rstrip() if self.area else ""
-        return f"{shown}\n{counts}{area}"
+        text = ", ".join(f"{count} {status}" for status, count in statuses.items())
+        if isinstance(area := self.settings.area, Area):
+            text = f"{text}; area: {area} {area.reason}".rstrip()
+        return f"{shown}\n{text}"
 
 
 def extract_days(
@@ -339,10 +326,13 @@ def extract_days(
     names = {each.name for each in fields(Recipe)} - {"area"}
     of_recipe = {name: parameters.pop(name) for name in names & parameters.keys()}
     settings = (settings or EncounterSettings()).with_parameters(parameters)
+    excluded = {exclude} if isinstance(exclude, str) else set(map(str, exclude))
     files = sorted({file.resolve() for file in datasets.find(paths)})
     recipe = find_recipe(files, recipe, **of_recipe)
-    folder, excluded = claim_folder(out, PURPOSE, inputs=files), _find_excluded(exclude)
-    days = _group_by_day(files, recipe)
+    folder = claim_folder(out, PURPOSE, inputs=files)
+    days: dict[str, list[Path]] = {}
+    for file, name in zip(files, name_recordings(files), strict=True):
+        days.setdefault(find_day(file, recipe) or printable(name), []).append(file)
     included = {day: days[day] for day in sorted(days.keys() - excluded)}
     shared = [day for day in included if has_calendar(day) or len(included) == 1]
     common, contents = settings, {}
@@ -357,37 +347,23 @@ def extract_days(
     tasks = [
         joblib.delayed(extract_day)(
             day,
-            of_day,
+            included[day],
             folder.resolve(),
             common if day in shared else settings,
             recipe,
             contents.get(day),
         )
-        for day, of_day in included.items()
-    ]
-    rows = [
-        _ROW | {"day": day, "files": len(days[day])} for day in days.keys() & excluded
+        for day in included
     ]
     found = run_tasks(tasks, n_jobs=n_jobs)
     is_hidden = None if progress else True  # None: shown in a terminal
-    rows += tqdm(found, total=len(tasks), unit="day", disable=is_hidden)
+    rows = list(tqdm(found, total=len(tasks), unit="day", disable=is_hidden))
+    for day in days.keys() & excluded:
+        rows.append(_ROW | {"day": day, "files": len(days[day])})
     table = pd.DataFrame(rows, columns=list(_ROW)).sort_values("day", ignore_index=True)
     sources = {row["day"]: row["source"] for row in rows if "source" in row}
-    if len(shared) < len(included):
-        common = settings
-    return Extraction(folder, table, common, recipe, sources, excluded)
-
-
-def _find_excluded(exclude: Iterable[str]) -> set[str]:
-    return {exclude} if isinstance(exclude, str) else set(map(str, exclude))
-
-
-def _group_by_day(files: Sequence[Path], recipe: Recipe) -> dict[str, list[Path]]:
-    """The files of each day, or of each recording that has no calendar day."""
-    days: dict[str, list[Path]] = {}
-    for file, name in zip(files, name_recordings(files), strict=True):
-        days.setdefault(find_day(file, recipe) or printable(name), []).append(file)
-    return days
+    of_all = common if len(shared) == len(included) else settings
+    return Extraction(folder, table, of_all, recipe, sources, excluded)
 
 
 def extract_day(
@@ -411,15 +387,17 @@ def extract_day(
             described = thread.submit(
                 copy_context().run, describe_source, files, settings, recipe
             )
-            samples = None
+            samples, status = None, "kept"
             if (out / f"{day}.parquet").is_file():
                 samples = load_day(out, day, described.result())
-            status = "kept"
             if samples is None:
                 status = "done"
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
-                    samples = find_encounters_in_files(files, settings, recipe)
+                    tracks = read_for_encounters(files, settings, recipe)
+                    samples = funnels.attach(no_samples(), funnels.get(tracks))
+                    if len(tracks):
+                        samples = find_encounters(tracks, settings=settings)
             begins = {find_day(file, recipe) or day for file in files}
         source = described.result()
         if begins != {day} or expected not in (None, source):
@@ -440,8 +418,5 @@ def extract_day(
             "source": source,
         }
     except Exception as error:  # whatever fails in one day, the others go on
-        is_known = isinstance(error, SzlibError)
-        row["why"] = printable(
-            error if is_known else f"{type(error).__name__}: {error}"
-        )
+        row["why"] = printable(error if isinstance(error, SzlibError) else repr(error))
     return row | {"seconds": time.perf_counter() - start}

@@ -577,7 +577,7 @@ def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
         == alone
         == by_day(days.samples())
     )
-    assert days.area is None
+    assert days.settings.area is None
     cache = DataCache(tmp_path / "results", list(map(str, files)))
     assert by_day(cache.encounters()) == alone
     assert by_day(find_encounters(cache.tracks(), area=cache.find_area())) == alone

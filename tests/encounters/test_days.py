@@ -448,8 +448,10 @@ def test_extraction_is_loaded_from_its_folder(days: list[Path], tmp_path: Path) 
     made = extract(days, tmp_path / "out", min_speed=0.5, max_gap=0.7)
     loaded = szlib.Extraction.load(tmp_path / "out")
     pd.testing.assert_frame_equal(loaded.samples(), made.samples(), check_exact=True)
-    assert list(loaded.table["day"]) == list(DATES) and loaded.area == made.area
-    assert loaded.settings == szlib.EncounterSettings(area=made.area, min_speed=0.5)
+    assert list(loaded.table["day"]) == list(DATES) and loaded.settings == made.settings
+    assert loaded.settings == szlib.EncounterSettings(
+        area=szlib.ATC_SQUARE, min_speed=0.5
+    )
     assert loaded.recipe == szlib.Recipe(max_gap=0.7)
     some = szlib.Extraction.load(tmp_path / "out", exclude=DATES[:3])
     assert set(some.samples()["day"]) == {DATES[3]}

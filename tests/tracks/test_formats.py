@@ -177,7 +177,7 @@ def test_extract_days_takes_columns(tmp_path: Path) -> None:
     tracks = szlib.read_tracks(tmp_path / "data" / "hall.csv", columns=columns)
     known = szlib.find_encounters(tracks, square=szlib.ATC_SQUARE)
     assert len(found.samples()) == len(known) > 0
-    assert found.area == szlib.ATC_SQUARE
+    assert found.settings.area == szlib.ATC_SQUARE
 
 
 # --- other programs ----------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from helpers.track_tables import real_data
 from studies import quality
 
 import szlib
-from szlib.encounters.days import find_encounters_in_files
+from szlib.encounters.days import read_for_encounters
 from szlib.tracks import funnels
 
 CONVENTIONS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}
@@ -171,9 +171,9 @@ def test_quality_and_encounters_use_the_estimated_frame_rate(tmp_path: Path) -> 
     settings = szlib.EncounterSettings(area=square, min_distance=0.0)
     whole = szlib.find_encounters(szlib.read_tracks(file), settings=settings)
     for options in (szlib.Recipe(), szlib.Recipe(frame_rate=25)):
-        pd.testing.assert_frame_equal(
-            find_encounters_in_files([file], settings, options), whole
-        )
+        tracks = read_for_encounters([file], settings, options)
+        found = szlib.find_encounters(tracks, settings=settings)
+        pd.testing.assert_frame_equal(found, whole)
 
 
 def test_the_eth_sequence_has_15_frames_a_second() -> None:

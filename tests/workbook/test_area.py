@@ -199,7 +199,7 @@ def test_data_quality_is_of_the_area_and_the_clock_of_the_run(tmp_path, monkeypa
                 "area": "0 11 0 7",
                 "results": str(tmp_path / "out"),
             }
-    assert str(variables["extraction"].area) == "0.0 11.0 0.0 7.0"
+    assert str(variables["extraction"].settings.area) == "0.0 11.0 0.0 7.0"
     assert len(variables["extraction"].failed) == 0
     assert variables["hours"]["hour"].tolist() == [13]
 

@@ -163,14 +163,14 @@ def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
             settings=PlazaSettings(n_encounters=5, date=f"2000-01-0{k}"),
         )
     (tmp_path / "rubbish.csv").write_text("rubbish\n")
-    find = days.find_encounters_in_files
+    read = days.read_for_encounters
 
-    def find_or_fail(files, *arguments):
+    def read_or_fail(files, *arguments):
         if files[0].name == "unforeseen.csv":
             raise KeyError("foreign")
-        return find(files, *arguments)
+        return read(files, *arguments)
 
-    monkeypatch.setattr(days, "find_encounters_in_files", find_or_fail)
+    monkeypatch.setattr(days, "read_for_encounters", read_or_fail)
     table = szlib.extract_days(
         tmp_path, out=tmp_path / "out", progress=False
     ).table.set_index("day")
@@ -178,7 +178,7 @@ def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
         "2000-01-01": "done", "latin\\xe4": "failed", "2000-01-03": "failed", "rubbish": "failed",
     }  # fmt: skip
     assert "rename the file" in table["why"]["latin\\xe4"]
-    assert table["why"]["2000-01-03"] == "KeyError: 'foreign'"
+    assert table["why"]["2000-01-03"] == "KeyError('foreign')"
     assert "'rubbish' has no column" in table["why"]["rubbish"]
 
 
