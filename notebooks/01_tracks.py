@@ -299,8 +299,8 @@ Markdown(
 #
 # Two people can only be watched where nothing is in their way: no pillar, no shop, no queue. The paper names "the
 # rectangular central square" without coordinates (fig. 1). In the mall the largest open rectangle is x from -18.5
-# to -7.5 m, y from -10 to 8 m. The plaza has the same. For other data `auto` takes the largest rectangle in
-# which at least three people walked on each square of 0.5 m x 0.5 m.
+# to -7.5 m, y from -10 to 8 m. The plaza has the same. For other data `auto` takes the outline of the
+# place where people were seen. It may hold furniture and pillars: gaps between people narrower than 4 m are closed.
 #
 # A test of openness that needs no map: do people walk on each square metre of it?
 

@@ -1,17 +1,13 @@
-"""Areas: one in any form (`as_area`), or the area in which people walked everywhere (`walked_area`)."""
+"""Areas: one in any form (`as_area`), or the outline of the place where people were seen (`walked_area`)."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import shapely
-from scipy.ndimage import distance_transform_edt
-from shapely.geometry.base import BaseGeometry
 
 from ..core.checks import check_columns
 from ..core.errors import DataError, warn
@@ -21,29 +17,30 @@ from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, AttentionalSpace, Square
 
 AUTO = "auto"  # stands for the area that `walked_area` finds
-EXPECTED = (
-    'expected "X0 X1 Y0 Y1" in metres, a polygon as well-known text or GeoJSON, a file of one of these, or '
-    f'"{AUTO}"'
+_FORMS = (
+    '"X0 X1 Y0 Y1" in metres, a polygon as well-known text or GeoJSON, a file of one of these, a polygon of '
+    f'Shapely or PedPy, or "{AUTO}"'
 )
+_NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
+# Text that is an area itself, not the path of a file.
+_AREA = rf"(?i)\s*((MULTI)?POLYGON\b|\{{)|[\s,]*{_NUMBER}([\s,]+{_NUMBER})*[\s,]*$"
 
-# People walked everywhere where at least so many walked on each cell of this width [m] (measured: it finds
-# the rectangle of the ATC mall that was found by eye, and the hall of Grand Central; 1 m misses pillars).
-_CELL, _PEOPLE = 0.5, 3
-# While the median visited cell saw no more people, cells are doubled, up to this width [m]: with few people
-# a cell is empty by chance (measured on plazas of 100 to 2,600 encounters).
-_SPARSE, _WIDEST = 4 * _PEOPLE, 2.0
 _WALKING = 0.4  # a slower person [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)
-# 3 s of walking [m], for which a rectangle is longer than the attentional space
-_BEHIND = 3 * 1.2
-# A rectangle that is narrower than this number of lengths of the space, and smaller than this share of the
-# place, wastes encounters (assumed; measured on small rooms and oblique views).
-_WIDE, _MAIN = 2.0, 2 / 3
-_MOST_CELLS = 400  # largest number of cells along an axis; cells grow with the site
-_APART = 50.0  # least distance of recordings that are placed side by side [m]
 _OUTLYING = 1e-3  # share of positions on either side that does not belong to the site: trackers jump
-# A spot can be seen unless a disc of this radius [m] in which nobody was seen covers it (assumed: as wide as
-# gaps that few people leave).  Each cell has so many parts along each axis, for which that is decided.
-_EMPTY, _PARTS = 2.0, 5
+# Width of the cells on which people were seen [m], and the most of them along an axis: those of a large site
+# are wider.
+_CELL, _MOST_CELLS = 0.125, 300
+# People can be seen unless a disc of this radius [m] fits in where nobody was seen (assumed: as wide as gaps
+# that few people leave).  Strips as wide as this [m] on both sides of their middle are left out (assumed).
+_GAP, _STRIP = 2.0, 0.5
+_ROUGH = 0.05  # deviation of the outline, which has fewer corners then [m]
+# Hardly anybody walked on a square of this width [m] if fewer people did (measured on the ATC mall: 1 m
+# misses pillars).  Where the median square that was walked on saw no more than `_FEW`, many are empty by
+# chance (measured on plazas of 100 to 2,600 encounters).
+_SPOT, _PEOPLE, _FEW = 0.5, 3, 12
+_DOUBTFUL = 0.01  # share of the area that is reported (assumed)
+_OUTLINE = "the outline of the place where people were seen"
+_APART = 51.0  # between recordings that are placed side by side, up to a metre less [m]
 
 
 def as_area(area: object) -> Area:
@@ -69,38 +66,30 @@ def as_area(area: object) -> Area:
     """
     if isinstance(area, Area):
         return area
-    if isinstance(area, Path) or (isinstance(area, str) and not _is_area(area)):
-        return _from_file(Path(area))
-    if isinstance(area, str):
+    if isinstance(area, str) and re.match(_AREA, area):
         return _from_text(area.strip())
-    if hasattr(area, "polygon"):
-        area = area.polygon
-    if hasattr(area, "geom_type"):
-        return Area(area)
-    if isinstance(area, list | tuple | np.ndarray):
-        return _from_numbers(area)
-    raise DataError(
-        f"{type(area).__name__} is no area; {EXPECTED}, an Area, a Shapely polygon or PedPy's"
-    )
+    if isinstance(area, str | Path):
+        with reading(Path(area), "as an area", _FORMS):
+            return _from_text(read_small(Path(area)).decode("utf-8-sig").strip())
+    shape = getattr(area, "polygon", area)
+    return Area(shape) if hasattr(shape, "geom_type") else _from_numbers(shape)
 
 
 def area_for(
     tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER_SPACE
 ) -> Area:
     """Convert `area` as `as_area` does; "auto" stands for the `walked_area` of the `tracks` for a `space`."""
-    if not (isinstance(area, str) and area.strip() == AUTO):
+    if str(area).strip() != AUTO:
         return as_area(area)
     places = _find_places(tracks)
-    if len(set(places.values())) < 2:
+    if places.nunique() < 2:
         return walked_area(tracks, space=space)
-    groups = tracks.groupby(tracks["day"].astype(str).map(places))
-    found = {name: walked_area(part, space=space) for name, part in groups}
-    reasons = "; ".join(
-        f"{name or 'days'}: {each.reason}" for name, each in found.items()
-    )
+    polygons = [
+        walked_area(part, space=space).polygon for _, part in tracks.groupby(places)
+    ]
     return Area(
-        shapely.union_all([each.polygon for each in found.values()]),
-        f"for each recording, side by side along x: {reasons}",
+        shapely.union_all(polygons),
+        f"{_OUTLINE}, for each of {len(polygons)} recordings, side by side along x",
     )
 
 
@@ -111,14 +100,12 @@ def place_apart(tracks: pd.DataFrame) -> pd.DataFrame:
     returned themselves.
     """
     places = _find_places(tracks)
-    if len(set(places.values())) < 2:
+    if places.nunique() < 2:
         return tracks
-    place = tracks["day"].astype(str).map(places)
-    offsets, end = {}, None
-    for name, (low, high) in tracks.groupby(place)["x"].agg(["min", "max"]).iterrows():
-        offsets[name] = 0 if end is None else int(np.ceil(end + _APART) - np.floor(low))
-        end = high + offsets[name]
-    return tracks.assign(x=tracks["x"] + place.map(offsets))
+    metres = (tracks["x"].round(3) // 1).groupby(places)
+    low, width = metres.min(), metres.max() - metres.min() + _APART
+    begin = low.iloc[0] + width.cumsum().shift(fill_value=0)
+    return tracks.assign(x=tracks["x"] + places.map(begin - low))
 
 
 def has_calendar(day: object) -> bool:
@@ -126,30 +113,22 @@ def has_calendar(day: object) -> bool:
     return re.match(r"\d{4}-\d\d-\d\d", str(day)) is not None
 
 
-def _find_places(tracks: pd.DataFrame) -> dict[str, str]:
-    """The name of the place of each day: that of a recording; empty for days of a calendar."""
-    return {
-        str(day): "" if has_calendar(day) else str(day)
-        for day in tracks["day"].unique()
-    }
+def _find_places(tracks: pd.DataFrame) -> pd.Series[str]:
+    """The name of the place of each row: that of its recording; empty on days of a calendar."""
+    day = tracks["day"].astype(object)
+    return day.map({each: "" if has_calendar(each) else each for each in day.unique()})
 
 
-def walked_area(
-    tracks: pd.DataFrame,
-    *,
-    space: AttentionalSpace = PAPER_SPACE,
-) -> Area:
-    """Find the largest rectangle along the axes in which people walked everywhere, or the place's outline.
-
-    Everywhere means: on each square cell of 0.5 m at least three people walked, at 0.4 m/s or faster.
-    The attentional space can turn in the rectangle.  Where few people walked, or such a rectangle is missing,
-    or narrow and a small part of the place (small rooms, corridors, oblique views), the area is the outline
-    of the place where people were seen.  It may hold spots where nobody walked (furniture, pillars), of
-    which a DataWarning states the share if many people walked: look at the map
-    (`plots.plot_map`, beside the notebooks).
+def walked_area(tracks: pd.DataFrame, *, space: AttentionalSpace = PAPER_SPACE) -> Area:
+    """Find the outline of the place where people were seen.
 
     The area never reaches outside where people can be seen: where people were seen, and in gaps between
-    them that are narrower than 4 m.
+    them that are narrower than 4 m.  Strips narrower than 1 m and pieces narrower than the attentional
+    space are left out, as is the thousandth of the positions that is farthest out on each side (trackers
+    that jump).
+
+    The area may hold spots where hardly anybody walked (furniture, pillars), of which a DataWarning states
+    the share if many people walked: look at the map (`plots.plot_map`, beside the notebooks).
 
     Parameters
     ----------
@@ -158,226 +137,89 @@ def walked_area(
 
     Returns
     -------
-    The area; its `reason` says what was taken, and why.
+    The area; its `reason` says what was taken.
 
     Raises
     ------
-    DataError : nobody walks, people were seen on lines only, or the table lacks a column.
+    DataError : nobody walks at 0.4 m/s or faster, people were seen on lines only, or a column is missing.
 
     Examples
     --------
     >>> import szlib
     >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> szlib.walked_area(szlib.read_tracks(plaza)).reason
-    'the outline of the place where people were seen, as few people walked'
+    'the outline of the place where people were seen'
     """
     check_columns(tracks, COLUMNS)
-    walks = tracks[np.hypot(*tracks[["vx", "vy"]].to_numpy(float).T) >= _WALKING]
-    if len(walks) == 0:
+    walks = tracks[np.hypot(tracks["vx"], tracks["vy"]) >= _WALKING]
+    if walks.empty:
         raise DataError(
             f"nobody walks at {_WALKING} m/s or faster in these tracks: no area can be found"
         )
-    count, corner, fine = _count_people(walks, _CELL)
-    seen = _find_seen_parts(tracks, corner, fine, count.shape)
-    middle, lowest, width = (
-        corner[:, None, None] + fine * (np.indices(count.shape) + 0.5),
-        corner,
-        fine,
-    )
-    while (
-        is_sparse := np.median(count[count > 0]) <= _SPARSE
-    ) and 2 * width <= _WIDEST:
-        count, lowest, width = _count_people(walks, 2 * width)
-    walked = (count >= _PEOPLE)[
-        tuple(((middle - lowest[:, None, None]) // width).astype(int))
+    low, high = np.quantile(walks[["x", "y"]], [_OUTLYING, 1 - _OUTLYING], axis=0)
+    cell = max(_CELL, (high - low).max() / _MOST_CELLS)
+    seen = _join_cells((tracks[["x", "y"]] / cell).round().drop_duplicates(), cell)
+    place = seen.intersection(shapely.box(*low, *high))
+    # in two steps, which is faster
+    grown = place.buffer(_GAP / 4).buffer(0.75 * _GAP)
+    # positions are anywhere in their cells, which reach half a cell too far on each side
+    inner = grown.buffer(-_GAP - _STRIP - cell / 2)
+    outline = inner.buffer(_STRIP).simplify(_ROUGH)
+    pieces = [
+        piece
+        for piece in shapely.get_parts(shapely.set_precision(outline, 0.01))
+        if not piece.buffer(-space.width / 2).is_empty
     ]
-    first, end = _largest_rectangle(
-        walked, int(np.ceil(np.hypot(space.length, space.width) / fine))
-    )
-    first, end = _trim(seen, _PARTS * first, _PARTS * end)
-    part, sides = fine / _PARTS, fine / _PARTS * (end - first)
-    is_main = (
-        sides.min() >= _WIDE * space.length
-        or sides.prod() >= _MAIN * part**2 * seen.sum()
-    )
-    if not is_sparse and is_main and sides.max() >= space.length + _BEHIND:
-        (x0, x1), (y0, y1) = (
-            (corner + part * np.stack([first, end])).round(6).T.tolist()
-        )
-        everywhere = f"on each cell of {width:g} m at least {_PEOPLE} people walked"
-        return replace(
-            Square((x0, x1), (y0, y1)),
-            reason=f"the largest rectangle in which {everywhere}",
-        )
-    outline = _outline(seen, corner, part, space)
-    if outline.is_empty:
-        implausible = "".join(
-            f"{text}; " for text in funnels.warnings(funnels.get(tracks))
-        )
+    if not pieces:
+        notes = [f"{note}; " for note in funnels.warnings(funnels.get(tracks))]
         raise DataError(
-            f"{implausible}no area was found: people were seen in no place as wide as the attentional "
+            f"{''.join(notes)}no area was found: people were seen in no place as wide as the attentional "
             f"space, {space.width:g} m x {space.length:g} m; use more data, pass a smaller space, or give "
-            f"the area yourself: {EXPECTED}"
+            f"the area yourself: expected {_FORMS}"
         )
-    middles = seen[_PARTS // 2 :: _PARTS, _PARTS // 2 :: _PARTS]
-    if not is_sparse and (share := 1 - walked[middles].mean()) > 0:
-        warn(
-            f"in {share:.0%} of the area found ({outline.area:.0f} m2) fewer than {_PEOPLE} people walked, "
-            "perhaps for furniture, pillars or walls: look at the map, and give a better area if you know one"
-        )
-    why = (
-        "few people walked"
-        if is_sparse
-        else "there is no large rectangle in which people walked"
-    )
-    return Area(outline, f"the outline of the place where people were seen, as {why}")
-
-
-def _find_seen_parts(
-    tracks: pd.DataFrame, corner: np.ndarray, cell: float, shape: tuple[int, ...]
-) -> np.ndarray:
-    """Whether people can be seen on each part of the cells, of which `_PARTS` x `_PARTS` make one."""
-    size, empty = _PARTS * np.array(shape), int(_EMPTY * _PARTS / cell)
-    place = ((tracks[["x", "y"]].to_numpy(float) - corner) // (cell / _PARTS)).astype(
-        np.int64
-    )
-    place = place[((place >= 0) & (place < size)).all(axis=1)]
-    parts = np.zeros(size + 2 * empty + 2, bool)
-    parts[tuple(place.T + empty + 1)] = True
-    covered = distance_transform_edt(~parts) <= empty
-    closed = distance_transform_edt(covered) > empty
-    return np.asarray(closed[empty + 1 : -empty - 1, empty + 1 : -empty - 1])
-
-
-def _trim(
-    seen: np.ndarray, first: np.ndarray, end: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The rectangle from `first` to `end` without the lines of its border that are `seen` least."""
-    first, end = first.copy(), end.copy()
-    while not (inside := seen[first[0] : end[0], first[1] : end[1]]).all():
-        lines = [(inside[0], first, 0, 1), (inside[:, 0], first, 1, 1)]
-        lines += [(inside[-1], end, 0, -1), (inside[:, -1], end, 1, -1)]
-        _, border, axis, step = min(lines, key=lambda line: line[0].mean())
-        border[axis] += step
-    return first, end
-
-
-def _outline(
-    seen: np.ndarray, corner: np.ndarray, part: float, space: AttentionalSpace
-) -> BaseGeometry:
-    """The outline of `seen` parts, without strips narrower than 1 m and pieces narrower than the space."""
-    ends = np.diff(np.pad(seen, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    (column, low), high = np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
-    whole, strip = (
-        shapely.union_all(shapely.box(column, low, column + 1, high)),
-        0.5 / part,
-    )
-    wide = (
-        whole.buffer(-strip, join_style="mitre")
-        .buffer(strip, join_style="mitre")
-        .intersection(whole)
-    )
-    shapes = shapely.transform(
-        shapely.get_parts(wide.simplify(1)), lambda points: corner + part * points
-    )
-    has_room = ~shapely.is_empty(shapely.buffer(shapes, -space.width / 2))
-    return shapely.set_precision(shapely.union_all(shapes[has_room]), 0.01)
-
-
-def _count_people(
-    walks: pd.DataFrame, cell: float
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Number of people who walked on each cell, (nx, ny); the lowest corner [m]; the width of a cell [m]."""
-    at = walks[["x", "y"]].to_numpy(float)
-    low, high = np.quantile(at, [_OUTLYING, 1 - _OUTLYING], axis=0)
-    while (high - low).max() / cell > _MOST_CELLS:
-        cell *= 2
-    first, size = np.floor(low / cell), np.floor(high / cell) - np.floor(low / cell) + 1
-    place = np.floor(at / cell) - first
-    within = ((place >= 0) & (place < size)).all(axis=1)
-    shape = (int(size[0]), int(size[1]))
-    spot = np.ravel_multi_index(tuple(place[within].T.astype(np.int64)), shape)
-    person = walks.groupby(["day", "id"], observed=True).ngroup().to_numpy()[within]
-    visits = np.unique(person * (shape[0] * shape[1]) + spot)
-    count = np.bincount(visits % (shape[0] * shape[1]), minlength=shape[0] * shape[1])
-    return count.reshape(shape), first * cell, cell
-
-
-def _largest_rectangle(walked: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """The largest rectangle of cells walked on that is at least `side` wide.
-
-    Returns its first cell and its end, each (2,); all 0 where there is none.
-    """
-    best, found = 0.0, (np.zeros(2, int), np.zeros(2, int))
-    if min(walked.shape) < side:
-        return found
-    total = np.zeros((walked.shape[0] + 1, walked.shape[1] + 1))
-    total[1:, 1:] = np.where(walked, 1.0, -walked.size).cumsum(axis=0).cumsum(axis=1)
-    for top in range(walked.shape[0] - side + 1):
-        # by last row: sums over columns from the first
-        strips = total[top + side :] - total[top]
-        least = np.minimum.accumulate(strips[:, :-side], axis=1)
-        gain = strips[:, side:] - least
-        row, column = np.unravel_index(int(gain.argmax()), gain.shape)
-        if gain[row, column] > best:
-            best = gain[row, column]
-            left = int(np.argmax(strips[row] == least[row, column]))
-            found = (
-                np.array([top, left]),
-                np.array([top + side + int(row), int(column) + side]),
+    area = Area(shapely.union_all(pieces), _OUTLINE)
+    spots = (walks[["x", "y"]] / _SPOT).round().assign(day=walks["day"], id=walks["id"])
+    people = spots.drop_duplicates().value_counts(["x", "y"])
+    if people.median() > _FEW:
+        walked = _join_cells(people.index[people >= _PEOPLE].to_frame(), _SPOT)
+        # but for a strip along the outline, where fewer people walk
+        share = inner.difference(walked).area / area.area
+        if share >= _DOUBTFUL:
+            warn(
+                f"in {share:.0%} of the area found ({area.area:.0f} m2) fewer than {_PEOPLE} people "
+                "walked, perhaps for furniture, pillars or walls: look at the map, and give a better area if "
+                "you know one"
             )
-    return found
+    return area
 
 
-def _is_area(text: str) -> bool:
-    """Whether a text is an area itself, not the path of a file."""
-    number = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
-    numbers, polygon = (
-        rf"[\s,]*{number}([\s,]+{number})*[\s,]*",
-        r"\s*((MULTI)?POLYGON\b.*|\{.*)",
-    )
-    return bool(
-        re.fullmatch(f"{numbers}|{polygon}", text, flags=re.IGNORECASE | re.DOTALL)
-    )
+def _join_cells(cells: pd.DataFrame, width: float) -> shapely.Geometry:
+    """The polygons of square cells of a `width` [m], given by their middles as multiples of it."""
+    ends = width * np.hstack([cells - 0.5, cells + 0.5])
+    return shapely.coverage_union_all(shapely.box(*ends.T))
 
 
-def _from_numbers(numbers: Any) -> Area:
+def _from_numbers(numbers: object) -> Area:
     try:
-        x0, x1, y0, y1 = map(float, numbers)
+        x0, x1, y0, y1 = map(float, np.asarray(numbers, float))
     except (TypeError, ValueError) as error:
         raise DataError(
-            f"{printable(str(numbers)[:80])}: is no area; {EXPECTED}"
+            f"{printable(str(numbers)[:80])}: is no area; expected {_FORMS}"
         ) from error
     return Square((x0, x1), (y0, y1))
 
 
-def _from_file(path: Path) -> Area:
-    """The area in a file: well-known text, GeoJSON, or four numbers."""
-    with reading(path, "as an area", EXPECTED.removeprefix("expected ")):
-        text = read_small(path).decode("utf-8-sig").strip()
-    if not text or not _is_area(text):
-        raise DataError(
-            f"{printable(path)}: begins with {printable(text[:40])!r}; {EXPECTED}"
-        )
-    try:
-        return as_area(text)
-    except DataError as error:
-        raise DataError(f"{printable(path)}: {error}") from error
-
-
 def _from_text(text: str) -> Area:
     """The area of four numbers, well-known text or GeoJSON: all polygons of a collection in one."""
-    if not re.match(r"[{MP]", text, re.IGNORECASE):
+    if text[:1] not in "{MPmp":
         return _from_numbers(text.replace(",", " ").split())
-    is_json = text.startswith("{")
+    read = shapely.from_geojson if text.startswith("{") else shapely.from_wkt
     try:
-        shape = shapely.from_geojson(text) if is_json else shapely.from_wkt(text)
+        shape = read(text)
+        if shape.geom_type == "GeometryCollection":
+            shape = shapely.union_all(shapely.get_parts(shape))
     except shapely.errors.ShapelyError as error:
-        form = "GeoJSON" if is_json else "well-known text"
         raise DataError(
-            f"{printable(text[:40])!r}: is no {form} ({error}); {EXPECTED}"
+            f"{printable(text[:40])!r}: is no well-known text and no GeoJSON ({error}); expected {_FORMS}"
         ) from error
-    if shape.geom_type == "GeometryCollection":
-        parts = shapely.get_parts(shape)
-        shape = shapely.union_all(parts) if len(parts) != 1 else parts[0]
     return Area(shape)

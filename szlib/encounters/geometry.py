@@ -9,7 +9,6 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from ..core.checks import require
-from ..core.errors import DataError
 from ..tracks.shapes import ATC_AREA
 
 
@@ -44,18 +43,21 @@ class Area:
     reason: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        polygon, given = self.polygon, repr(str(self.polygon)[:80])
-        if not isinstance(polygon, Polygon | MultiPolygon) or polygon.is_empty:
-            raise DataError(
-                f"{given}: an area must be a polygon with an inside; got a {type(polygon).__name__}"
-            )
-        if not (np.isfinite(polygon.bounds).all() and polygon.is_valid):
-            raise DataError(
-                f"{given}: is no valid polygon ({shapely.is_valid_reason(polygon)}); its border "
-                "must not cross itself (shapely.make_valid can repair it)"
-            )
-        text = shapely.to_wkt(polygon, rounding_precision=-1, output_dimension=2)
-        shape = shapely.from_wkt(text)  # as it is written: digits are lost
+        polygon = self.polygon
+        require(
+            isinstance(polygon, Polygon | MultiPolygon) and not polygon.is_empty,
+            "an area",
+            polygon,
+            "a polygon with an inside",
+        )
+        require(
+            polygon.is_valid,
+            "the border of an area",
+            shapely.is_valid_reason(polygon),
+            "that of a valid polygon: it must not cross itself (shapely.make_valid can repair it)",
+        )
+        # as it is written as text: digits are lost
+        shape = shapely.from_wkt(shapely.force_2d(polygon).wkt)
         if shape.equals(shape.envelope):
             # 0 for -0, which has another hash
             shape = shapely.box(*np.add(polygon.bounds, 0.0))
@@ -64,7 +66,7 @@ class Area:
     def __str__(self) -> str:
         if self.is_rectangle:
             return " ".join(map(str, self.x + self.y))
-        return str(shapely.to_wkt(self.polygon, rounding_precision=-1))
+        return str(self.polygon.wkt)
 
     def __repr__(self) -> str:
         return f"Area(x={self.x}, y={self.y}, area={self.area})"
@@ -77,12 +79,12 @@ class Area:
     @property
     def x(self) -> tuple[float, float]:
         """Its extent along x, (lowest, highest) [m]."""
-        return self.polygon.bounds[0], self.polygon.bounds[2]
+        return tuple(self.polygon.bounds[::2])
 
     @property
     def y(self) -> tuple[float, float]:
         """Its extent along y, (lowest, highest) [m]."""
-        return self.polygon.bounds[1], self.polygon.bounds[3]
+        return tuple(self.polygon.bounds[1::2])
 
     @property
     def area(self) -> float:
@@ -107,9 +109,8 @@ class Area:
         """
         inside = np.asarray(self.contains(x, y).all(axis=0))
         if not self.polygon.equals(self.polygon.convex_hull):
-            at = np.flatnonzero(inside)
-            corners = np.stack([x[:, at].T, y[:, at].T], axis=-1)
-            inside[at] = shapely.covers(self.polygon, shapely.polygons(corners))
+            corners = np.stack([x.T, y.T], axis=-1)[inside]
+            inside[inside] = shapely.covers(self.polygon, shapely.polygons(corners))
         return inside
 
     def grown(self, margin: float) -> Area:
@@ -136,9 +137,11 @@ def Square(x: tuple[float, float], y: tuple[float, float]) -> Area:
     >>> szlib.ATC_SQUARE.area
     198.0
     """
-    is_square = np.isfinite([*x, *y]).all() and x[0] < x[1] and y[0] < y[1]
+    x0, x1 = x
+    y0, y1 = y
+    is_square = -np.inf < x0 < x1 < np.inf and -np.inf < y0 < y1 < np.inf
     require(is_square, "x and y of a square", (x, y), "finite, each (lowest, highest)")
-    return Area(shapely.box(x[0], y[0], x[1], y[1]))
+    return Area(shapely.box(x0, y0, x1, y1))
 
 
 ATC_SQUARE = Square(*ATC_AREA)
@@ -171,10 +174,10 @@ class AttentionalSpace:
     centred: bool = False
 
     def __post_init__(self) -> None:
-        for name, side in (("length", self.length), ("width", self.width)):
+        for side in (self.length, self.width):
             require(
                 0 < side < np.inf,
-                f"{name} of an attentional space",
+                "length and width of an attentional space",
                 side,
                 "positive [m]",
             )
@@ -182,21 +185,20 @@ class AttentionalSpace:
     @property
     def ahead(self) -> tuple[float, float]:
         """Extent along the direction of motion, (nearest, farthest) [m]."""
-        return (
-            (-self.length / 2, self.length / 2) if self.centred else (0.0, self.length)
-        )
+        nearest = -self.length / 2 if self.centred else 0.0
+        return nearest, nearest + self.length
 
     @property
     def corners(self) -> np.ndarray:
         """The four corners in the reference pedestrian's frame, shape (4, 2) [m]."""
-        (near, far), side = self.ahead, self.width / 2
+        near, far = self.ahead
+        side = self.width / 2
         return np.array([(near, -side), (far, -side), (far, side), (near, side)])
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether points `x` ahead and `y` to the left of the person [m] lie inside or on the border."""
-        return np.asarray(
-            (x >= self.ahead[0]) & (x <= self.ahead[1]) & (np.abs(y) <= self.width / 2)
-        )
+        nearest, farthest = self.ahead
+        return (nearest <= x) & (x <= farthest) & (abs(y) <= self.width / 2)
 
 
 PAPER_SPACE = AttentionalSpace()
@@ -205,4 +207,4 @@ PAPER_SPACE = AttentionalSpace()
 
 def wrap_angle(angle: np.ndarray) -> np.ndarray:
     """Wrap each `angle` [rad] to (-pi, pi]."""
-    return np.asarray(np.pi - np.mod(np.pi - angle, 2 * np.pi))
+    return np.pi - (np.pi - angle) % (2 * np.pi)
