@@ -258,7 +258,9 @@ class Extraction:
                     "data or parameters, or damage); extract again, into another folder"
                 )
             parts[day] = part
-        samples = pd.concat(parts, names=["file"]).reset_index("file")
+        # a stored table without a row has no categories
+        filled = {day: part for day, part in parts.items() if len(part)} or parts
+        samples = pd.concat(filled, names=["file"]).reset_index("file")
         samples["day"] = samples["day"].astype(str)
         samples = samples[~samples["day"].isin(self.exclude)].reset_index(drop=True)
         samples["encounter"] = samples.groupby(

@@ -281,6 +281,20 @@ def test_day_without_encounters_gives_an_empty_table(
     )
 
 
+@pytest.mark.parametrize("empty", [0, 1])
+def test_day_without_encounters_changes_no_type_of_the_others(
+    days: list[Path], tmp_path: Path, empty: int
+) -> None:
+    rows = pd.read_csv(days[empty], header=None)
+    rows[2] += 500_000  # x [mm]: far from the area
+    far = tmp_path / days[empty].name
+    rows.to_csv(far, header=False, index=False, float_format="%.3f")
+    both = extract([days[1 - empty], far], tmp_path / "both")
+    assert both.table["encounters"][empty] == 0
+    alone = extract(days[1 - empty], tmp_path / "alone").samples()
+    pd.testing.assert_frame_equal(both.samples(), alone, check_exact=True)
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
