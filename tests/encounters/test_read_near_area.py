@@ -189,15 +189,20 @@ def test_unreadable_files_raise_as_in_read_tracks(tmp_path: Path) -> None:
 def test_rows_half_a_second_before_and_a_window_after_are_selected(
     duration: float, max_gap: float
 ) -> None:
-    """And one gap farther both ways, to interpolate; but at most three cells more."""
-    t = (np.arange(4000) / 10).round(1)
-    there = pl.DataFrame(
-        {"id": t.astype(int) * 0, "t": t, "x": np.where(t == 200, -10.0, 90.0)}
-    )
-    blocks = there.with_columns(y=pl.lit(0.0)).iter_slices(300)
-    found = pl.concat(select_near(blocks, szlib.ATC_SQUARE, duration, max_gap))["t"]
-    first, last = 200 - 0.5 - max_gap, 200 + max(duration, 0.5) + max_gap
-    assert found.min() <= first and found.max() >= last
-    spare = 3 * (max_gap + 0.1)
-    assert found.min() >= first - spare and found.max() <= last + spare
-    np.testing.assert_allclose(np.diff(found), 0.1, atol=1e-6)
+    """And one gap farther both ways, to interpolate; but few more.
+
+    A person crosses the area within a gap, wherever this falls in the cells: no row is inside.
+    """
+    width, steps = max_gap + 0.1, np.arange(int(10 * (duration + 3 * max_gap + 3))) / 10
+    for cells in 300 + np.linspace(0, 1, 11) + 1e-6:
+        last, next_one = cells * width, cells * width + max_gap
+        t = np.r_[last - steps[::-1], next_one + steps]
+        rows = pl.DataFrame({"id": 7, "t": t, "x": np.where(t <= last, -40.0, 30.0)})
+        rows = rows.with_columns(pl.col("id").cast(pl.Int64), y=pl.lit(0.0))
+        blocks = rows.iter_slices(20)
+        found = pl.concat(select_near(blocks, szlib.ATC_SQUARE, duration, max_gap))["t"]
+        first, end = last - 0.5 - max_gap, next_one + max(duration, 0.5) + max_gap
+        assert found.min() <= first + 1e-6 and found.max() >= end - 0.1 - 1e-6
+        assert found.min() >= first - 3 * width and found.max() <= end + 3 * width
+        chosen = (t >= found.min()) & (t <= found.max())
+        np.testing.assert_array_equal(found, t[chosen])
