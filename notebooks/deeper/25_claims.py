@@ -125,7 +125,7 @@ record.figure(fig, "verdicts")
 # %% jupyter={"source_hidden": true}
 # Computation
 samples = record.cache.encounters()
-null = record.cache.null_model(few_shifts=4)  # two encounters for each of the data are enough
+null = record.cache.null_model()
 speeds = (0.7, zone_speed, 1.3)
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # what is not adequate cannot decide, and says so

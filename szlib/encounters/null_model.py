@@ -208,7 +208,7 @@ def null_encounters(
     >>> tracks = szlib.read_tracks(plaza)
     >>> null = szlib.null_encounters(tracks, shifts=2, minutes=(0.2, 1), progress=False)
     >>> list(null.encounters.columns)
-    ['encounter', 'shift', 'kind', 'nearest']
+    ['encounter', 'kind', 'nearest', 'shift']
     """
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     tracks, area = find_place(tracks, settings)
@@ -271,7 +271,7 @@ def null_pairs(
     >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> null = szlib.null_pairs(szlib.read_tracks(plaza), shifts=2, progress=False)
     >>> null.shifts, list(null.encounters.columns)
-    (2, ['encounter', 'shift', 'kind', 'nearest'])
+    (2, ['encounter', 'kind', 'nearest', 'shift'])
     """
     tracks, place = find_place(tracks, EncounterSettings(area=area))
     crowd, rng = Crowd.from_tracks(tracks, place), np.random.default_rng(seed)

@@ -276,7 +276,7 @@ def _fit(options: argparse.Namespace) -> int:
     from .. import EncounterSettings
     from .fit_command import fit
 
-    names = ("out", "method", "kind", "tracks", "exclude", "jobs")
+    names = ("out", "method", "kind", "tracks", "exclude")
     given = {name: getattr(options, name) for name in names}
     given["settings"] = EncounterSettings(area=options.area, has_walls=options.walls)
     given["reading"] = _read_options(options, options.data)

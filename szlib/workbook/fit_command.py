@@ -57,7 +57,6 @@ def fit(
     kind: Sequence[str] | None = None,
     tracks: Sequence[str] = (),
     exclude: Sequence[str] = (),
-    jobs: int = 1,
 ) -> str:
     """Fit a zone, write it and its figure, and return its table and verdict as text.
 
@@ -69,7 +68,6 @@ def fit(
     method, kind : as `method` of `szlib.SocialZone.fit`, and as `szlib.of_kind`.
     tracks : tracks of extracted days, for the null model.
     exclude : extracted days to leave out.
-    jobs : processes for the null model.
 
     Raises
     ------
@@ -82,13 +80,13 @@ def fit(
     file = _require_place(Path(out))
     if any(folder_purpose(path) == several_days.PURPOSE for path in paths):
         samples, table, settings = _read_days(paths, tracks, exclude)
-        zone = _fit_lone_encounters(samples, table, settings, method, kind, jobs)
+        zone = _fit_lone_encounters(samples, table, settings, method, kind)
     elif tracks or exclude:
         raise DataError(
             f"--tracks and --exclude belong to a folder of extracted days; {paths[0]} is none"
         )
     else:
-        zone, table = _fit_files(paths, settings, reading, method, kind, jobs)
+        zone, table = _fit_files(paths, settings, reading, method, kind)
     figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
     zone.plot(SPEED if SPEED in zone.ellipses else None, ax=figure.subplots())
     figure.savefig(content, format="png", dpi=150)
@@ -135,7 +133,6 @@ def _fit_files(
     reading: Recipe,
     method: str | None,
     kind: Sequence[str] | None,
-    jobs: int,
 ) -> tuple[SocialZone, pd.DataFrame]:
     """Fit a zone to files of tracks: ours to every pair of people, the others to lone encounters."""
     files = datasets.find(paths)
@@ -152,7 +149,7 @@ def _fit_files(
             ) from error
     samples = find_encounters(table, settings=settings)
     several_days.require_encounters(samples)
-    return _fit_lone_encounters(samples, table, settings, method, kind, jobs), table
+    return _fit_lone_encounters(samples, table, settings, method, kind), table
 
 
 def _fit_lone_encounters(
@@ -161,13 +158,11 @@ def _fit_lone_encounters(
     settings: EncounterSettings,
     method: str | None,
     kind: Sequence[str] | None,
-    jobs: int,
 ) -> SocialZone:
     """Fit a zone to lone encounters, with their null model where there is a track `table`."""
     samples, null = of_kind(samples, kind), None
     if table is not None:
-        options: Any = {"kinds": kind, "n_jobs": jobs, "progress": True}
-        null = find_null_model(table, samples, settings, r_max=R_MAX, **options)
+        null = find_null_model(table, settings=settings, kinds=kind, r_max=R_MAX)
     elif method == "respect":
         raise DataError(f"method respect needs a null model; {NO_TRACKS}")
     try:

@@ -205,19 +205,6 @@ def test_zone_of_other_data_is_not_loaded_if_it_replaces_the_file(record, monkey
     assert record.cache.zone().r_max == 2.0
 
 
-@pytest.mark.parametrize(("n_encounters", "shifts"), [(4999, 39), (5000, 19)])
-def test_where_many_people_meet_the_null_model_has_fewer_shifts(
-    record, monkeypatch, n_encounters, shifts
-):
-    samples = pd.DataFrame({"encounter": np.arange(n_encounters)})
-    monkeypatch.setattr(DataCache, "encounters", lambda self: samples)
-    monkeypatch.setattr(
-        data_cache, "null_encounters", lambda tracks, **options: options["shifts"]
-    )
-    assert record.cache.null_model() == shifts
-    assert record.cache.null_model(few_shifts=4) == (39 if shifts == 39 else 4)
-
-
 def test_damaged_zone_is_fitted_again(record, monkeypatch):
     (record.out / "zone.json").write_text("{")
     monkeypatch.setattr(

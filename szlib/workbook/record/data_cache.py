@@ -37,10 +37,8 @@ from ...zones.social_zone import recorded_hours
 from ...zones.verdict import describe_missing_encounters
 from .parameters import ZoneMethod
 
-# time-shifted copies of the data that the zone is tested against (assumed)
+# time-shifted copies of the data that lone encounters are compared with (assumed)
 NULL_SHIFTS = 39
-# With so many encounters in the data, fewer copies decide (assumed): with 19, p can be 0.05 but not less.
-MANY_ENCOUNTERS, FEW_SHIFTS = 5000, 19
 
 
 @dataclass(frozen=True)
@@ -165,14 +163,10 @@ class DataCache:
             zone = SocialZone.fit(self.encounters(), method="paper", **options)
         return self.store_zone(zone)
 
-    def null_model(self, few_shifts: int = FEW_SHIFTS) -> NullEncounters | None:
-        """The null model of the data; None, and a message, where the data is too short for one.
-
-        See `find_null_model` for its shifts, `few_shifts` where the data has many encounters.
-        """
+    def null_model(self) -> NullEncounters | None:
+        """The null model of the encounters, as from `find_null_model`."""
         tracks, settings = self._searched()
-        options: Any = {"few_shifts": few_shifts, "r_max": self.method.r_max}
-        return find_null_model(tracks, self.encounters(), settings, **options)
+        return find_null_model(tracks, settings=settings, r_max=self.method.r_max)
 
     def ellipse(self) -> Ellipse:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
@@ -239,26 +233,13 @@ class DataCache:
         return self._source() | {"fit": self.method.fit_options()}
 
 
-def find_null_model(
-    tracks: pd.DataFrame,
-    samples: pd.DataFrame,
-    settings: EncounterSettings,
-    *,
-    few_shifts: int = FEW_SHIFTS,
-    **options: Any,
-) -> NullEncounters | None:
+def find_null_model(tracks: pd.DataFrame, **options: Any) -> NullEncounters | None:
     """The null model of `tracks`; None, and a message, where they are too short for one.
 
-    It has `NULL_SHIFTS` shifts, or `few_shifts` where the `samples` are of `MANY_ENCOUNTERS` or more.
-    `settings` and `options` are as for `szlib.null_encounters`.
+    `options` are as for `szlib.null_encounters`.
     """
-    shifts = (
-        NULL_SHIFTS if samples["encounter"].nunique() < MANY_ENCOUNTERS else few_shifts
-    )
     try:
-        return null_encounters(
-            tracks, settings=settings, shifts=shifts, **{"progress": False} | options
-        )
+        return null_encounters(tracks, shifts=NULL_SHIFTS, progress=False, **options)
     except DataError as error:
         print(f"The zone is not tested against a null model: {error}")
         return None
