@@ -24,6 +24,7 @@ from ..core.checks import Array
 from ..core.errors import ZoneError
 from ..core.files import write_file
 from ..encounters.geometry import wrap_angle
+from ..zones.ellipses import unit_vectors
 from .settings import (
     MARGIN,
     MIN_WALKING_SPEED,
@@ -128,7 +129,7 @@ def stage_encounters(
     plan, speed, before, motion = _draw_encounters(rng, settings)
     n = len(plan)
     heading = rng.uniform(-np.pi, np.pi, n)
-    ahead = _unit_vectors(heading)
+    ahead = unit_vectors(heading)
     swept = swept_length(speed)
     half = (
         np.abs(ahead) * swept[:, None] + np.abs(_rotate_left(ahead)) * SPACE.width
@@ -252,7 +253,7 @@ def _draw(
     beside = np.arctan2(b * np.cos(angle), a * np.sin(angle)) + np.pi * rng.integers(
         2, size=n
     )
-    unit = _unit_vectors(np.where(standing, beside, bearing))
+    unit = unit_vectors(np.where(standing, beside, bearing))
     edge = _rotate(_rotate_left(unit) * semi_axes, angle)
     point = center + _rotate(unit * semi_axes, angle)
     edge /= np.linalg.norm(edge, axis=-1, keepdims=True)
@@ -379,11 +380,6 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
 def _stratify(rng: np.random.Generator, n: int, low: float, high: float) -> Array:
     """n numbers in random order, one in each nth part from low to high."""
     return low + (high - low) * rng.permutation(np.arange(n) + rng.uniform(size=n)) / n
-
-
-def _unit_vectors(angle: Array) -> Array:
-    """Unit vectors (..., 2) at `angle` (...) [rad]."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def _rotate_left(vectors: Array) -> Array:
