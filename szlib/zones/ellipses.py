@@ -59,24 +59,23 @@ class Ellipse:
     support: Array | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        center = (float(self.center[0]), float(self.center[1]))
-        a, b = (float(axis) for axis in self.semi_axes)
-        if not np.all(np.isfinite([*center, a, b, self.angle])):
+        x, y = map(float, self.center)
+        a, b = map(float, self.semi_axes)
+        if not np.isfinite([x, y, a, b, self.angle]).all():
             raise ZoneError(
                 f"an ellipse needs finite numbers; got {self.center}, {(a, b)}, {self.angle}"
             )
         if not a >= b > 0:
             raise ZoneError(f"semi-axes must satisfy a >= b > 0; got a = {a}, b = {b}")
-        object.__setattr__(self, "center", center)
+        angle = float(np.pi / 2 - (np.pi / 2 - self.angle) % np.pi)
+        object.__setattr__(self, "center", (x, y))
         object.__setattr__(self, "semi_axes", (a, b))
-        object.__setattr__(
-            self, "angle", float(np.pi / 2 - (np.pi / 2 - self.angle) % np.pi)
-        )
+        object.__setattr__(self, "angle", angle)
 
     @property
     def area(self) -> float:
         """Area [m2]."""
-        return float(np.pi * self.semi_axes[0] * self.semi_axes[1])
+        return np.pi * self.semi_axes[0] * self.semi_axes[1]
 
     @property
     def parameters(self) -> Array:
@@ -95,22 +94,16 @@ class Ellipse:
         """The foci and the semi-major axis, (xa, ya, xb, yb, a) [m]: the input of the distance formula."""
         return (*self.foci.ravel().tolist(), self.semi_axes[0])
 
-    @property
-    def _axes(self) -> Array:
-        """Unit vectors along the major and the minor axis, shape (2, 2)."""
-        cosine, sine = unit_vectors(self.angle)
-        return np.array([[cosine, sine], [-sine, cosine]])
-
     def level(self, points: ArrayLike) -> Array:
         """Left side of the ellipse equation at `points` (..., 2) [m]: 1 on the curve, less inside."""
         offset = np.asarray(points, float) - self.center
-        along = (offset[..., None, :] * self._axes).sum(axis=-1)
+        along = (offset[..., None, :] * _axes(self.angle)).sum(axis=-1)
         return np.asarray(((along / self.semi_axes) ** 2).sum(axis=-1))
 
     def curve(self, n: int = 200) -> Array:
         """`n` points on the curve, shape (n, 2) [m]; the last repeats the first."""
         along = unit_vectors(np.linspace(0, 2 * np.pi, n)) * self.semi_axes
-        return np.asarray(self.center + along @ self._axes)
+        return self.center + along @ _axes(self.angle)
 
     def scaled(self, scale: float) -> Ellipse:
         """This ellipse of a person's frame, enlarged by the factor `scale` about the person."""
@@ -125,10 +118,8 @@ class Ellipse:
         position : (x, y) of the person [m].
         heading : direction in which the person faces, counter-clockwise from x [rad].
         """
-        (x, y), (m, n) = np.asarray(position, float), self.center
-        cosine, sine = np.cos(heading), np.sin(heading)
-        center = (x + m * cosine - n * sine, y + m * sine + n * cosine)
-        return Ellipse(center, self.semi_axes, self.angle + heading)
+        center = np.asarray(position, float) + self.center @ _axes(heading)
+        return Ellipse(tuple(center), self.semi_axes, self.angle + heading)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,8 +170,8 @@ class EllipseZone:
         share = (speed - speeds[0]) / (speeds[1] - speeds[0])
         weights = (1 - share, share)
         center = np.average([e.center for e in ends], axis=0, weights=weights)
-        matrices = [(e._axes.T * np.square(e.semi_axes)) @ e._axes for e in ends]
-        matrix = np.average(matrices, axis=0, weights=weights)
+        roots = [_axes(e.angle).T * e.semi_axes for e in ends]
+        matrix = np.average([r @ r.T for r in roots], axis=0, weights=weights)
         squares, axes = np.linalg.eigh(matrix)
         b, a = np.sqrt(squares)
         return Ellipse(tuple(center), (a, b), np.arctan2(axes[1, 1], axes[0, 1]))
@@ -211,7 +202,13 @@ def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:
     x, y = (m * cos + n * sin) / a, (n * cos - m * sin) / b
     p, q, r = u * u + v * v, u * x + v * y, x * x + y * y - 1
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(r < 0, (q + np.sqrt(q * q - p * r)) / p, np.nan))
+        return np.where(r < 0, (q + np.sqrt(q * q - p * r)) / p, np.nan)
+
+
+def _axes(angle: float) -> Array:
+    """Unit vectors along and to the left of the direction `angle` [rad], shape (2, 2)."""
+    cosine, sine = unit_vectors(angle)
+    return np.array([[cosine, sine], [-sine, cosine]])
 
 
 def unit_vectors(theta: ArrayLike) -> Array:

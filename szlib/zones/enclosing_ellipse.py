@@ -23,15 +23,15 @@ Curve = Callable[[Array], Array]
 
 _MIN_WIDTH = 1e-9  # width over length below which points count as collinear (a choice, far from any zone)
 # excess of the level that counts as rounding
-_POINT_TOLERANCE, _CURVE_TOLERANCE = (1e-13, 1e-12)
+_POINT_TOLERANCE, _CURVE_TOLERANCE = 1e-13, 1e-12
 # Newton decrements: each is below the square of the last
-_FULL_STEP, _CONVERGED = (0.25, 1e-8)
+_FULL_STEP, _CONVERGED = 0.25, 1e-8
 _TINY, _SQRT2 = 1e-15, np.sqrt(2)  # smaller singular values count as zero
 # I - 3 e1 e1^T: gradients of log det M and 3 sum w
 _TARGET = np.array([-2.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 _ARC_SAMPLES = 25  # nodes of an arc; on an arc of a zone the level has one or two peaks
 # each zoom makes a bracket 8 times smaller: 8^-9 < sqrt(machine precision)
-_ZOOM, _N_ZOOMS = (8, 9)
+_ZOOM, _N_ZOOMS = 8, 9
 _MAX_ROUNDS = 50  # exchanges with a curve; a smooth curve needs about six
 
 
@@ -98,7 +98,7 @@ def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> 
     1.0
     """
     corners = np.asarray(breaks, float)
-    if corners.ndim != 1 or not np.all(np.isfinite(corners)):
+    if corners.ndim != 1 or not np.isfinite(corners).all():
         raise ZoneError(
             f"breaks must be finite angles of shape (k,) [rad]; got {breaks!r}"
         )
@@ -109,7 +109,7 @@ def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> 
     ) / 2  # denser towards the corners
     angles = ends[:-1, None] + np.diff(ends)[:, None] * nodes
     samples = _evaluate(curve, angles)
-    points: Array = samples.reshape(-1, 2)
+    points = samples.reshape(-1, 2)
     support: list[int] = []
     for number in range(_MAX_ROUNDS):
         ellipse, support = _enclose(points, support)
@@ -119,11 +119,8 @@ def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> 
         if np.max(excess, initial=0) <= _CURVE_TOLERANCE:
             return _scale_to_contain(ellipse, np.vstack([points, peak_points]))
         outside = excess > 0
-        finer = (
-            spacing[outside]
-            / float(_ZOOM) ** number
-            * np.linspace(-1, 1, 4 * _ZOOM + 1)[:, None]
-        )
+        steps = np.linspace(-1, 1, 4 * _ZOOM + 1)[:, None]
+        finer = spacing[outside] / float(_ZOOM) ** number * steps
         points = np.vstack(
             [points, peak_points, _evaluate(curve, (peaks[outside] + finer).ravel())]
         )
@@ -154,7 +151,7 @@ def check_points(points: ArrayLike, columns: str, min_points: int) -> Array:
             f"points must have shape (n, {size}), n >= {min_points}, one row ({columns}) each; "
             f"got {array.shape}; add data"
         )
-    for i in np.flatnonzero(~np.all(np.isfinite(array), axis=1))[:1]:
+    for i in np.flatnonzero(~np.isfinite(array).all(axis=1))[:1]:
         raise ZoneError(
             f"points must be finite; point {i} is {array[i].tolist()}: drop or repair it"
         )
@@ -188,9 +185,7 @@ def _enclose(
         active, weights = [*support, farthest], np.append(weights, 0.0)
     axes, semi_axes, _ = np.linalg.svd(np.sqrt(2) * frame @ root[1:, 1:])
     center, angle = origin + frame @ root[1:, 0], np.arctan2(axes[1, 0], axes[0, 0])
-    ellipse = Ellipse(
-        (center[0], center[1]), (semi_axes[0], semi_axes[1]), angle, points[support]
-    )
+    ellipse = Ellipse(tuple(center), tuple(semi_axes), angle, points[support])
     return _scale_to_contain(ellipse, points), support
 
 
@@ -230,7 +225,7 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
     digits. A row is dropped when its weight would become negative. (Six points on one conic have a singular
     R. The step then goes along its kernel until a row is dropped: Caratheodory's reduction to five.)
     """
-    rows, last = np.arange(len(q)), float("inf")
+    rows, last = np.arange(len(q)), np.inf
     while True:
         root = _root(q[rows], weights)
         x, y, z = np.linalg.solve(root, q[rows].T)
@@ -244,7 +239,7 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
         length = 1.0 if decrement < _FULL_STEP else 1 / (1 + decrement)
         limits = np.full(len(rows), np.inf)
         np.divide(weights, -step, out=limits, where=step < 0)
-        dropped = int(np.argmin(limits))
+        dropped = np.argmin(limits)
         is_complete = limits[dropped] > length
         weights = np.maximum(weights + min(length, limits[dropped]) * step, 0)
         if not is_complete:
@@ -254,26 +249,27 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
             decrement < _CONVERGED or last <= decrement < _FULL_STEP
         ):  # or rounding
             return rows, weights
-        last = decrement if is_complete else float("inf")
+        last = decrement if is_complete else np.inf
 
 
 def _scale_to_contain(ellipse: Ellipse, points: Array) -> Ellipse:
     """The ellipse scaled about its centre so that, rounding included, its level at points is at most 1."""
-    scale = float(np.sqrt(np.max(ellipse.level(points))))
+    scale = np.sqrt(np.max(ellipse.level(points)))
     a, b = ellipse.semi_axes
     return replace(ellipse, semi_axes=(a * scale, b * scale))
 
 
 def _evaluate(curve: Curve, angles: Array) -> Array:
     """Points of the curve at angles (...), shape (..., 2)."""
-    points = np.asarray(curve(angles.ravel()), float)
-    if points.shape != (angles.size, 2):
+    flat = angles.ravel()
+    points = np.asarray(curve(flat), float)
+    if points.shape != (flat.size, 2):
         raise ZoneError(
-            f"curve must give points (n, 2); got {points.shape} for n = {angles.size} angles"
+            f"curve must give points (n, 2); got {points.shape} for n = {flat.size} angles"
         )
-    for i in np.flatnonzero(~np.all(np.isfinite(points), axis=1))[:1]:
+    for i in np.flatnonzero(~np.isfinite(points).all(axis=1))[:1]:
         raise ZoneError(
-            f"the curve must be finite; at {angles.ravel()[i]} rad it is {points[i].tolist()}"
+            f"the curve must be finite; at {flat[i]} rad it is {points[i].tolist()}"
         )
     return points.reshape(*angles.shape, 2)
 
@@ -290,13 +286,11 @@ def _find_peaks(
     before, here, after = level[:, :-2], level[:, 1:-1], level[:, 2:]
     may_exceed = 2 * here - np.minimum(before, after) >= 1 - _CURVE_TOLERANCE
     arc, best = np.nonzero((here >= before) & (here >= after) & may_exceed)
-    grid, rows, last = angles[arc], np.arange(len(arc)), angles.shape[1] - 1
+    grid, rows = angles[arc], np.arange(len(arc))
     spacing = np.max(np.diff(grid, axis=1), axis=1)
     for _ in range(_N_ZOOMS):
-        low, high = (
-            grid[rows, np.maximum(best - 1, 0)],
-            grid[rows, np.minimum(best + 1, last)],
-        )
-        grid, last = np.linspace(low, high, 2 * _ZOOM + 1, axis=1), 2 * _ZOOM
+        ends = np.clip([best - 1, best + 1], 0, grid.shape[1] - 1)
+        low, high = grid[rows, ends]
+        grid = np.linspace(low, high, 2 * _ZOOM + 1, axis=1)
         best = np.argmax(ellipse.level(_evaluate(curve, grid)), axis=1)
     return grid[rows, best], spacing

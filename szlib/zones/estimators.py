@@ -64,6 +64,6 @@ class Estimator(ABC):
         Ellipses (k, s, 5): centre, semi-axes [m] and angle [rad]; NaN where there is no zone.
         """
 
-    def draw_posterior(self, speeds: Sequence[float]) -> Draws | None:
-        """Draw ellipses at `speeds` from the posterior: values (k, s, 5) as in `refit`; None: it has none."""
+    def posterior(self, speeds: Sequence[float]) -> Draws | None:
+        """Draws of ellipses at `speeds`, values (k, s, 5) as from `refit`; None: there is no posterior."""
         return None

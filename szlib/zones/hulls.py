@@ -84,15 +84,15 @@ class Slice:
 
     def __post_init__(self) -> None:
         if (self._edges()[1] <= 0).any():  # the origin is outside the polygon
-            away = self.polygon[np.hypot(*self.polygon.T) > 0]
+            away = self.polygon[self.polygon.any(axis=1)]
             raise missing_directions_error(
-                self.speed, np.sort(np.arctan2(away[:, 1], away[:, 0]))
+                self.speed, np.sort(np.angle(away @ [1, 1j]))
             )
 
     @property
     def corner_angles(self) -> Array:
         """Sorted directions of the corners [rad]. Between them the zone's boundary is smooth."""
-        return np.sort(np.arctan2(self.polygon[:, 1], self.polygon[:, 0]))
+        return np.sort(np.angle(self.polygon @ [1, 1j]))
 
     def reach(self, theta: ArrayLike) -> Array:
         """R'(theta), the distance from the origin to the polygon's edge; same shape as `theta` [m]."""
@@ -103,9 +103,7 @@ class Slice:
 
     def boundary(self, theta: ArrayLike) -> Array:
         """Boundary of the zone in the directions `theta` (...) [rad], in the person's frame, (..., 2) [m]."""
-        return np.asarray(
-            (self.r_max - self.reach(theta))[..., None] * unit_vectors(theta)
-        )
+        return (self.r_max - self.reach(theta))[..., None] * unit_vectors(theta)
 
     def _edges(self) -> tuple[Array, Array]:
         """Outward unit normals (k, 2) and distances from the origin (k,) of the polygon's edges."""
@@ -137,13 +135,12 @@ def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
     """
     hull = _convex_hull(points)
     v = hull.points[:, 2]
-    low, high = v[hull.vertices].min(), v[hull.vertices].max()
-    if not low < speed < high:
+    if not v.min() < speed < v.max():
         raise ZoneError(
-            f"the zone at {speed:g} m/s is undefined: the data covers {low:.3f} to {high:.3f} m/s"
+            f"the zone at {speed:g} m/s is undefined: the data covers {v.min():.3f} to {v.max():.3f} m/s"
         )
-    pairs = np.sort(hull.simplices, axis=1)[:, [[0, 1], [0, 2], [1, 2]]]
-    edges = np.unique(pairs.reshape(-1, 2), axis=0)
+    corners = np.sort(hull.simplices, axis=1)
+    edges = corners[:, [[0, 1], [0, 2], [1, 2]]].reshape(-1, 2)
     slowest, fastest = np.sort(v[edges], axis=1).T
     is_cut = (slowest <= speed) & (speed <= fastest) & (slowest < fastest)
     i, j = edges[is_cut].T
@@ -155,7 +152,7 @@ def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
         raise ZoneError(
             f"the zone at {speed:g} m/s is undefined: the hull has no extent there; add data"
         ) from error
-    return Slice(section[outline.vertices], float(speed), float(r_max))
+    return Slice(section[outline.vertices], speed, r_max)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,12 +181,13 @@ class HullZone:
     r_max: float
 
     def __post_init__(self) -> None:
-        hull_vertices(self.vertices)
+        _convex_hull(self.vertices)
 
     @property
     def speed_range(self) -> tuple[float, float]:
         """Lowest and highest speed of the hull [m/s]."""
-        return float(self.vertices[:, 2].min()), float(self.vertices[:, 2].max())
+        speed = self.vertices[:, 2]
+        return float(speed.min()), float(speed.max())
 
     def slice(self, speed: float) -> Slice:
         """The slice at a `speed` [m/s]; raises ZoneError if the zone is undefined there."""
@@ -241,8 +239,8 @@ class HullEstimator(Estimator):
         """
         options: dict[str, Any] = {"fraction": fraction, "n_neighbours": n_neighbours}
         inliers = remove_outliers(samples, r_max=r_max, **options)
-        speed = inliers["speed"].to_numpy(float)
-        points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
+        near = complementary_points(inliers, r_max=r_max)
+        points = np.column_stack([near, inliers["speed"].to_numpy(float)])
         n_vertices = len(hull_vertices(points))
         stage = funnels.stage(
             "hull",
@@ -254,7 +252,7 @@ class HullEstimator(Estimator):
         return cls(
             points=points,
             number=number,
-            r_max=float(r_max),
+            r_max=r_max,
             encounters=encounters,
             parameters=options,
             funnel=[*funnels.get(inliers), stage],
@@ -275,8 +273,10 @@ class HullEstimator(Estimator):
         for i, weight in enumerate(weights):
             with suppress(ZoneError):
                 hull = _convex_hull(self.points[weight[self.number] > 0])
-                reach = _hull_reach(hull, unit, speeds)
-                for j in np.flatnonzero(np.isfinite(reach).all(axis=1)):
+                normals, by_speed, shift = np.split(hull.equations, [2, 3], axis=1)
+                offsets = -(shift + by_speed * speeds).T
+                reach = _reach(unit @ normals.T, offsets[:, None])
+                for j in np.flatnonzero((offsets > 0).all(axis=1)):
                     boundary = (self.r_max - reach[j])[:, None] * unit
                     ellipses[i, j] = minimum_enclosing_ellipse(boundary).parameters
         return ellipses
@@ -296,28 +296,16 @@ def find_widest_gap(known: Array) -> tuple[float, float]:
     if not len(known):
         return -np.pi, np.pi
     widths = np.diff(np.append(known, known[0] + 2 * np.pi))
-    widest = int(np.argmax(widths))
-    return float(known[widest]), float(known[widest] + widths[widest])
+    widest = np.argmax(widths)
+    return known[widest], known[widest] + widths[widest]
 
 
 def _reach(along: Array, offsets: Array) -> Array:
     """Distance from the origin to the nearest edge, in directions.
 
-    `along` (..., edges) are the cosines of directions with the normals of edges, which are at `offsets`.
+    `along` (..., edges) are the cosines of directions with the normals of edges, which are at `offsets`
+    (..., edges).
     """
-    ahead = along > 0
-    return np.asarray(
-        np.min(np.where(ahead, offsets / np.where(ahead, along, 1.0), np.inf), axis=-1)
-    )
-
-
-def _hull_reach(hull: ConvexHull, unit: Array, speeds: Sequence[float]) -> Array:
-    """R' (s, k) of the hull at speeds along unit vectors (k, 2) [m]; NaN: undefined zone."""
-    along = (hull.equations[:, :2] @ unit.T).T
-    v = hull.points[hull.vertices, 2]
-    reach = np.full((len(speeds), len(unit)), np.nan)
-    for i, speed in enumerate(speeds):
-        offset = -(hull.equations[:, 3] + hull.equations[:, 2] * speed)
-        if v.min() < speed < v.max() and (offset > 0).all():
-            reach[i] = _reach(along, offset)
-    return reach
+    every = np.full(np.broadcast_shapes(along.shape, offsets.shape), np.inf)
+    np.divide(offsets, along, out=every, where=along > 0)
+    return np.asarray(every.min(axis=-1))

@@ -51,15 +51,13 @@ def complementary_points(samples: pd.DataFrame, *, r_max: float = R_MAX) -> Arra
     >>> complementary_points(samples, r_max=2.0).tolist()
     [[1.5, 0.0]]
     """
-    check_columns(samples, ["los_angle", "distance"])
-    angle, distance = (
-        samples["los_angle"].to_numpy(float),
-        samples["distance"].to_numpy(float),
-    )
+    columns = ["los_angle", "distance"]
+    check_columns(samples, columns)
+    angle, distance = samples[columns].to_numpy(float).T
     is_valid = np.isfinite(angle) & (distance >= 0) & (distance <= r_max)
     expected = f"expected 0 <= distance <= r_max = {r_max} m and a finite los_angle"
-    check_rows(samples, is_valid, ["los_angle", "distance"], expected)
-    return np.asarray((r_max - distance)[:, None] * unit_vectors(angle))
+    check_rows(samples, is_valid, columns, expected)
+    return (r_max - distance)[:, None] * unit_vectors(angle)
 
 
 def is_close(distance: Array, r_max: float) -> NDArray[np.bool_]:
@@ -90,7 +88,7 @@ def encounter_numbers(samples: pd.DataFrame) -> tuple[NDArray[np.intp], pd.DataF
 def pair_numbers(samples: pd.DataFrame) -> NDArray[np.intp]:
     """The number of the pair of people of each of `samples` (n,), on each day, whoever is the reference."""
     people = pd.DataFrame(np.sort(samples[["ref_id", "other_id"]].to_numpy(), axis=1))
-    day = samples["day"].to_numpy() if "day" in samples else np.zeros(len(samples))
+    day = np.asarray(samples.get("day", np.zeros(len(samples))))
     groups = people.groupby([day, 0, 1], observed=True, dropna=False)
     return np.asarray(groups.ngroup(), np.intp)
 
@@ -99,9 +97,7 @@ def nearest_approaches(samples: pd.DataFrame) -> pd.DataFrame:
     """The nearest of the `samples` of each encounter (see `encounter_numbers`), one row for each."""
     check_columns(samples, ["los_angle", "distance"])
     number = encounter_numbers(samples)[0]
-    order = np.lexsort(
-        (samples["los_angle"].to_numpy(), samples["distance"].to_numpy(), number)
-    )
+    order = np.lexsort((samples["los_angle"], samples["distance"], number))
     return samples.iloc[order[np.r_[True, np.diff(number[order]) > 0]]]
 
 
@@ -179,7 +175,7 @@ def is_outlier(
             complementary_points(nearest, r_max=r_max), axis=0, return_inverse=True
         )
         is_far = _find_far(places, n_neighbours)[place.ravel()]
-        return np.asarray(is_far[encounter_numbers(samples)[0]])
+        return is_far[encounter_numbers(samples)[0]]
     require(
         0 <= fraction <= 0.5,
         "fraction",
@@ -193,7 +189,7 @@ def is_outlier(
     factors = local_outlier_factors(
         _separate_copies(points, n_neighbours), n_neighbours
     )
-    return np.asarray(factors > np.quantile(factors, 1 - fraction))
+    return factors > np.quantile(factors, 1 - fraction)
 
 
 def remove_outliers(
@@ -244,9 +240,9 @@ def remove_outliers(
 
 
 def _find_far(places: Array, n_neighbours: int | None) -> NDArray[np.bool_]:
-    """Which places of nearest approaches (n, d), all different, are outliers and nearer than most others."""
+    """Which places of nearest approaches (n, 2), all different, are outliers and nearer than most others."""
     is_far = np.zeros(len(places), bool)
-    reach = np.hypot(*places[:, :2].T)
+    reach = np.hypot(*places.T)
     if n_neighbours is None and len(places) <= N_NEIGHBOURS:
         warn(
             f"{len(places)} encounters are too few to find outliers (LOF compares each with {N_NEIGHBOURS} "
@@ -279,7 +275,7 @@ def _check_neighbours(n_neighbours: int, n: int) -> None:
 
 def _separate_copies(points: Array, n_neighbours: int) -> Array:
     """Add a little noise, with a DataWarning, if so many points coincide that LOF has no density."""
-    copies = int(np.unique(points, axis=0, return_counts=True)[1].max())
+    copies = np.unique(points, axis=0, return_counts=True)[1].max()
     if copies <= n_neighbours // 2:
         return points
     warn(

@@ -70,9 +70,10 @@ def reference_zone(name: str) -> ReferenceZone:
     >>> hall.ellipse.semi_axes, str(hall.verdict)
     ((1.2, 1.2), 'undecided')
     """
-    zones = json.loads(FILE.read_text(encoding="utf-8"))
+    zones = json.loads(FILE.read_bytes())
     require(name in zones, "name", name, f"one of {', '.join(zones)}", ZoneError)
     entry = zones[name]
     verdict = Verdict(entry["verdict"], entry.pop("reasons"))
     ellipse = Ellipse(**entry["ellipse"])
-    return ReferenceZone(name, **{**entry, "ellipse": ellipse, "verdict": verdict})
+    entry |= {"ellipse": ellipse, "verdict": verdict}
+    return ReferenceZone(name, **entry)

@@ -112,12 +112,13 @@ class RespectEstimator(Estimator):
         )
         against = null.samples[null.samples["distance"] < r_max]
         if "kind" in close and "kind" in against:
-            of_kind = close["kind"].isin(_KINDS) & close["kind"].isin(
-                against["kind"].unique()
-            )
+            kinds = {*_KINDS} & {*close["kind"]} & {*against["kind"]}
+            is_compared = close["kind"].isin(kinds)
             reason = "of a kind that is not compared (same direction, companions), or not in the null model"
-            close = funnels.select(close, of_kind, "samples: kinds compared", reason)
-            against = against[against["kind"].isin(close["kind"].unique())]
+            close = funnels.select(
+                close, is_compared, "samples: kinds compared", reason
+            )
+            against = against[against["kind"].isin(kinds)]
         rng = np.random.default_rng(0)
         is_drawn = _draw(close["encounter"], _DATA_DRAWN, rng)
         if not is_drawn.all():
@@ -174,8 +175,12 @@ class RespectEstimator(Estimator):
         rows = zone_ellipses(self.best[None], speeds)[0]
         if np.isnan(ellipse_reach(rows)).any():
             raise ZoneError("the respect zone does not contain its person; add data")
-        ellipses = [Ellipse(row[:2], row[2:4], row[4]) for row in rows]
-        return EllipseZone(dict(zip(speeds, ellipses, strict=True)))
+        return EllipseZone(
+            {
+                speed: Ellipse(row[:2], row[2:4], row[4])
+                for speed, row in zip(speeds, rows, strict=True)
+            }
+        )
 
     def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
         """Fit ellipses to encounters with `weights` at `speeds`, from the fit of all."""
@@ -184,12 +189,8 @@ class RespectEstimator(Estimator):
         ]
         return zone_ellipses(np.array(fits), speeds)
 
-    def draw_posterior(self, speeds: Sequence[float]) -> Draws:
-        """The draws as ellipses at `speeds` (s,) [m/s]: see `posterior`."""
-        return replace(self.draws, values=self.posterior(speeds))
-
-    def posterior(self, speeds: Sequence[float]) -> Array:
-        """All ellipses drawn from the posterior at `speeds` (s,) [m/s], shape (k, s, 5).
+    def posterior(self, speeds: Sequence[float]) -> Draws:
+        """The ellipses drawn from the posterior at `speeds` (s,) [m/s], values (k, s, 5).
 
         Of a nearly round zone the longer axis of a draw is now the one, now the other. So the first semi-axis
         of all draws is the one nearer to the longer one of the zone itself, even where it is the shorter one.
@@ -199,7 +200,8 @@ class RespectEstimator(Estimator):
         mean, spread = ellipses.mean(axis=0), np.maximum(ellipses.std(axis=0), 1e-9)
         wide = mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)
         best = zone_ellipses(self.best[None], speeds)
-        return np.asarray(np.where(_is_across(best), _exchange_axes(wide), wide))
+        wide = np.where(_is_across(best), _exchange_axes(wide), wide)
+        return replace(self.draws, values=wide)
 
 
 def _draw(
@@ -219,6 +221,6 @@ def _is_across(ellipses: Array) -> Array:
 
 def _exchange_axes(ellipses: Array) -> Array:
     """The same `ellipses` (..., 5) with the other semi-axis first, its angle within 90 deg of ahead."""
-    m, n, a, b, angle = np.moveaxis(ellipses, -1, 0)
-    turned = np.where(angle > 0, angle - np.pi / 2, angle + np.pi / 2)
-    return np.stack([m, n, b, a, turned], axis=-1)
+    exchanged = ellipses[..., [0, 1, 3, 2, 4]]
+    exchanged[..., 4] += np.where(ellipses[..., 4] > 0, -np.pi / 2, np.pi / 2)
+    return exchanged

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, minimize
 from scipy.special import expit
 from threadpoolctl import ThreadpoolController
 
@@ -24,9 +24,17 @@ from .smoothing import smooth_paths
 REFERENCE_SPEED = 1.1  # at which the parameters describe the ellipse [m/s]
 # slower and faster people carry the ellipse of these speeds [m/s]
 _SPEED_BOUNDS = (0.3, 2.0)
-# Columns of the samples: direction of the other person, and speed, of each of the two people.
-VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
-COLUMNS = ["encounter", "distance", *VIEWS[0], *VIEWS[1]]
+COLUMNS = [
+    "encounter",
+    "distance",
+    "los_angle",
+    "speed",
+    "other_los_angle",
+    "other_speed",
+]
+# Columns of each of the two people: direction of the other person, and speed; and their lowest speed [m/s].
+# A person who stands has no direction of motion, and one of unknown velocity has none either.
+_VIEWS = (("los_angle", "speed", 0.0), ("other_los_angle", "other_speed", WALKING))
 
 EXCESS_PRIOR = (-3.0, 2.0)  # mean and standard deviation of log A
 # Of each parameter: lowest and highest value, mean and standard deviation of its prior.
@@ -49,10 +57,10 @@ _REPORTED = 9  # the ellipse, and the share f of careless people
 # Spread of the first draws, as a share of the bounds: the data tells the ellipse better than f, w, A and c.
 _FIRST_SPREAD = np.repeat([0.02, 0.15, 0.05], [8, 1, 3])
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
-_BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
+_BANK = 24  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
 # number of best circles tried, and the least difference of their radii [m]
-_STARTS, _START_GAP = (3, 0.15)
+_STARTS, _START_GAP = 3, 0.15
 _RESTARTS = 10
 # How far back the centre is moved to look for another peak [m], and the least gain in log density for which
 # it is moved on.
@@ -86,18 +94,15 @@ class PairPaths:
         Raises DataError if a column is missing or a value is not finite.
         """
         check_columns(samples, COLUMNS)
-        columns = ["distance", *VIEWS[0]]
+        columns = COLUMNS[1:4]
         is_finite = np.isfinite(samples[columns].to_numpy(float)).all(axis=1)
         check_rows(samples, is_finite, columns, "expected finite numbers")
         number, encounters = encounter_numbers(samples)
         views = []
-        for angle, own_speed in VIEWS:
+        for angle, own_speed, slowest in _VIEWS:
             theta, r = smooth_paths(samples, angle)
             own, path = samples[own_speed].to_numpy(float), r * np.exp(1j * theta)
-            # A person who stands has no direction of motion, and one of unknown velocity has none either.
-            has_zone = np.isfinite(path) & (
-                own >= (WALKING if own_speed == "other_speed" else 0.0)
-            )
+            has_zone = np.isfinite(path) & (own >= slowest)
             carried = np.clip(own, *_SPEED_BOUNDS) - REFERENCE_SPEED
             view = pd.DataFrame(
                 {"x": path.real, "y": path.imag, "speed": carried, "row": number}
@@ -119,18 +124,17 @@ class PairPaths:
         return np.flatnonzero(np.diff(self.encounter, prepend=-1))
 
     @cached_property
-    def _coarse(self) -> list[NDArray[Any]]:
-        """Positions and speeds in 32 bits, among which the nearest is sought: half the time of 64."""
-        return [v.astype(np.float32) for v in (self.x, self.y, self.speed)]
+    def coarse(self) -> PairPaths:
+        """The same in 32 bits, which take half the time of 64.
 
-    def distances(self, p: Array, *, fast: bool = False) -> Array:
-        """h of each encounter for the parameters `p`, shape (k,) [m].
-
-        If it must be `fast`, the nearest sample is sought in 32 bits, and h jumps by 1e-7 m: an optimiser
-        that follows lines stops there, a draw does not mind.
+        Then h jumps by 1e-7 m: an optimiser that follows lines stops there, a draw does not mind.
         """
-        x, y, speed = self._coarse if fast else (self.x, self.y, self.speed)
-        every = _signed_distances(x, y, speed, p)[0]
+        x, y, speed = (v.astype("float32") for v in (self.x, self.y, self.speed))
+        return replace(self, x=x, y=y, speed=speed)
+
+    def distances(self, p: Array) -> Array:
+        """h of each encounter for the parameters `p`, shape (k,) [m]."""
+        every = _signed_distances(self.x, self.y, self.speed, p)[0]
         return np.minimum.reduceat(every, self.first).astype(float)
 
     def _is_nearest(self, p: Array) -> NDArray[np.bool_]:
@@ -165,12 +169,10 @@ class PairPaths:
         return h, np.stack(slopes, axis=1)
 
 
-def _signed_distances(
-    x: Array, y: Array, speed: Array, p: Array
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Distances of points to the ellipse of `p` [m], and what they are made of.
+def _signed_distances(x: Array, y: Array, speed: Array, p: Array) -> tuple[Array, ...]:
+    """Distances of points to the ellipse of `p` [m], and the four numbers they are made of.
 
-    That is the point in the frame in which the ellipse is the unit circle, and the inverse semi-axes. The
+    These are the point in the frame in which the ellipse is the unit circle, and the inverse semi-axes. The
     distance to the circle is multiplied by the geometric mean of the semi-axes.
     """
     p = p.astype(x.dtype)
@@ -184,13 +186,10 @@ def _signed_distances(
 def _bank() -> Array:
     """Parameters of ellipses of all forms, one a row."""
     bank = np.zeros((_BANK, len(_PARAMETERS)))
-    low, high = (
-        (-0.25, -0.1, -0.3, *np.log([0.35, 0.35])),
-        (0.25, 0.1, 0.3, *np.log([1.5, 1.3])),
-    )
-    bank[:, [0, 2, 7, 3, 5]] = np.random.default_rng(_BANK_SEED).uniform(
-        low, high, (_BANK, 5)
-    )
+    low = [-0.25, -0.1, -0.3, *np.log([0.35, 0.35])]
+    high = [0.25, 0.1, 0.3, *np.log([1.5, 1.3])]
+    rng = np.random.default_rng(0)
+    bank[:, [0, 2, 7, 3, 5]] = rng.uniform(low, high, (_BANK, 5))
     return bank
 
 
@@ -209,10 +208,9 @@ def respect_factor(
     return f + (1 - f) * s * (1 + near), s, near, outside
 
 
-def _edge(p: Array) -> tuple[Any, Any, Any, Any]:
-    """The last arguments of `respect_factor` from the parameters `p`."""
-    w, excess, reach = np.exp(p[9:])
-    return expit(p[8]), w, excess, reach
+def _edge(p: Array) -> tuple[Any, ...]:
+    """The last four arguments of `respect_factor` from the parameters `p`."""
+    return expit(p[8]), *np.exp(p[9:])
 
 
 def _factor_and_slopes(h: Array, p: Array) -> tuple[Array, Array, Array]:
@@ -265,12 +263,12 @@ class Likelihood:
             out[of_data] -= np.log(against[of_null].mean())
         return float((self.weights * out).sum())
 
-    def log_posterior(self, p: Array, *, fast: bool = False) -> float:
+    def log_posterior(self, p: Array) -> float:
         """Logarithm of the posterior density of the parameters `p`; 0 without a zone.
 
-        `fast` is as in `PairPaths.distances`. The likelihood has a power, since the null model is random too.
+        The likelihood has a power below 1, since the null model is random as well.
         """
-        h, h_null = (each.distances(p, fast=fast) for each in (self.data, self.null))
+        h, h_null = self.data.distances(p), self.null.distances(p)
         power = 1 / (1 + self.weights.sum() / len(self.null.kind))
         return float(power * self.log_ratio(p, h, h_null) - _minus_log_prior(p)[0])
 
@@ -293,14 +291,14 @@ class Likelihood:
 
     def maximise(self, starts: Sequence[Array]) -> Array:
         """The best parameters found from several `starts`."""
-        bounds = list(zip(_LOW, _HIGH, strict=True))
+        bounds = Bounds(_LOW, _HIGH)
         # several threads take ten times as long for small products
         with threads().limit(limits=1):
             tries = [
                 minimize(self.cost, p, jac=True, method="L-BFGS-B", bounds=bounds)
                 for p in starts
             ]
-        return np.asarray(min(tries, key=lambda found: float(found.fun)).x)
+        return np.asarray(min(tries, key=lambda found: found.fun).x)
 
     def find_best(self, rng: np.random.Generator) -> Array:
         """The maximum: the best of several starts, and of `_RESTARTS` starts around it drawn with `rng`.
@@ -343,9 +341,10 @@ class Likelihood:
 
     def draw(self, start: Array, rng: np.random.Generator) -> Draws:
         """Draw parameters from the posterior around its maximum `start`, with `rng`."""
+        coarse = replace(self, data=self.data.coarse, null=self.null.coarse)
         with threads().limit(limits=1):
             return sample(
-                partial(self.log_posterior, fast=True),
+                coarse.log_posterior,
                 start,
                 _LOW,
                 _HIGH,
@@ -371,20 +370,14 @@ def threads() -> ThreadpoolController:
 
 def zone_ellipses(parameters: Array, speeds: Sequence[float]) -> Array:
     """Ellipses (k, s, 5), centre, semi-axes and angle, for `parameters` (k, 12) at `speeds` (s,) [m/s]."""
-    p = np.asarray(parameters)[:, None, :]
-    speed = np.clip(np.asarray(speeds, float), *_SPEED_BOUNDS) - REFERENCE_SPEED
-    along, across = (
-        np.exp(-p[..., 3] - p[..., 4] * speed),
-        np.exp(-p[..., 5] - p[..., 6] * speed),
-    )
-    shear = -p[..., 7] * across
-    form = np.stack(
-        [along**2 + shear**2, shear * across, shear * across, across**2], axis=-1
-    )
-    values, vectors = np.linalg.eigh(form.reshape(*along.shape, 2, 2))
+    p = parameters.T[..., None]
+    speed = np.clip(speeds, *_SPEED_BOUNDS) - REFERENCE_SPEED
+    ahead = p[0] + p[1] * speed
+    by_a, by_b = np.exp(-p[3] - p[4] * speed), np.exp(-p[5] - p[6] * speed)
+    shear = -p[7] * by_b
+    form = np.array([[by_a**2 + shear**2, shear * by_b], [shear * by_b, by_b**2]])
+    values, vectors = np.linalg.eigh(np.moveaxis(form, [0, 1], [-2, -1]))
     major = vectors[..., 0]
     angle = np.pi / 2 - (np.pi / 2 - np.arctan2(major[..., 1], major[..., 0])) % np.pi
-    centre = p[..., 0] + p[..., 1] * speed, np.broadcast_to(p[..., 2], along.shape)
-    return np.stack(
-        [*centre, values[..., 0] ** -0.5, values[..., 1] ** -0.5, angle], axis=-1
-    )
+    left = np.broadcast_to(p[2], ahead.shape)
+    return np.stack([ahead, left, *np.moveaxis(values, -1, 0) ** -0.5, angle], axis=-1)

@@ -41,11 +41,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import permutations, product
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import expit
 from scipy.stats import chi2
 
@@ -106,7 +105,7 @@ def collect_approaches(
     model = find_nearest(null.samples) if smooth else null.encounters
     both = pd.concat([data, model], join="inner", ignore_index=True)
     found = both[(both["nearest"] >= excluded_below) & (both["nearest"] < null.r_max)]
-    n = int((found["shift"] == -1).sum())
+    n = (found["shift"] == -1).sum()
     n_null = len(found) - n
     if not (n and n_null):
         raise ZoneError(
@@ -151,15 +150,16 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
     r = (np.arange(_N_BINS) + 0.5) * width
     is_seen = r > approaches["nearest"].min() - width
     strata = list(_histograms(approaches, r_max))
-    n, m = (sum(float(each[side].sum()) for each in strata) for side in (0, 1))
-    if not n:
+    if not strata:
         raise ZoneError(
             "no kind of encounter is in the data and in its null model as well: nothing to compare"
         )
+    n, m = np.sum(strata, axis=(0, 2))
     radii = np.arange(_N_RADII) / _N_RADII * _FARTHEST * r_max
     h, softness = r - radii[:, None, None, None], _SOFTNESS[:, None, None]
     share = _IGNORING[:, None]
-    (mean, spread), found = EXCESS_PRIOR, list[tuple[Array, Array]]()  # by R, w and f
+    mean, spread = EXCESS_PRIOR
+    found: list[tuple[Array, Array]] = []  # by R, w and f
     for excess, reach in _EXCESS:
         g, edge, *_ = respect_factor(h, share, softness, excess, reach)
         likelihood, careless = np.zeros((2, *g.shape[:-1]))
@@ -175,13 +175,15 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
     likelihood, careless = np.stack(found, axis=1)
     is_likely = 2 * (likelihood.max() - likelihood) <= chi2.ppf(_LEVEL, 1) * (1 + n / m)
     is_zone = _IGNORING < 0.5
-    radius = np.broadcast_to(radii[:, None, None] * is_zone, likelihood.shape)
-    best, least = likelihood.argmax(), radius[is_likely].min()
-    at, most = radius.flat[best], radius[is_likely].max()
+    every = np.broadcast_to(radii[:, None, None] * is_zone, likelihood.shape)
+    best, least = likelihood.argmax(), every[is_likely].min()
+    at, most = every.flat[best], every[is_likely].max()
+    low, high = min(least, max(at - _MODEL_ERROR, 0.0)), max(most, at + _MODEL_ERROR)
+    radius, low, high = np.round([at, low, high], 2).tolist()
     return RespectRadius(
-        radius=round(float(at), 2),
-        low=round(float(min(least, max(at - _MODEL_ERROR, 0.0))), 2),
-        high=round(float(max(most, at + _MODEL_ERROR)), 2),
+        radius,
+        low,
+        high,
         careless=float(careless.flat[best]),
         careless_high=float(careless[is_likely].max()),
     )
@@ -191,12 +193,11 @@ def _histograms(
     approaches: pd.DataFrame, r_max: float
 ) -> Iterable[tuple[Array, Array]]:
     """Histograms of data and null model over the distance, for each kind that both have."""
-    share = approaches["nearest"].to_numpy() / r_max * _N_BINS
-    binned = approaches.assign(bin=np.minimum(share, _N_BINS - 1).astype(int))
-    for _, of_kind in binned.groupby("kind"):
+    for _, of_kind in approaches.groupby("kind"):
+        is_real = of_kind["shift"] == 0
         real, null = (
-            np.bincount(of_kind["bin"][side], minlength=_N_BINS).astype(float)
-            for side in (of_kind["shift"] == 0, of_kind["shift"] > 0)
+            np.histogram(of_kind["nearest"][side], _N_BINS, (0, r_max))[0]
+            for side in (is_real, ~is_real)
         )
         if real.any() and null.any():
             yield real, null
@@ -293,7 +294,7 @@ def null_test(
     """
     _warn_about_kinds(samples, null)
     found = collect_approaches(samples, null, excluded_below=excluded_below)
-    p_value, statistics = _compare(found, null.shifts)
+    p_value, (statistic, *null_statistics) = _compare(found, null.shifts)
     sensor, p_beyond = null.sensor, None
     if sensor is not None and sensor.loses_people:
         far = found[found["nearest"] >= sensor.resolved]
@@ -303,11 +304,11 @@ def null_test(
     )
     return NullTest(
         p_value=p_value,
-        statistic=float(statistics[0]),
-        null_statistics=tuple(map(float, statistics[1:])),
+        statistic=statistic,
+        null_statistics=tuple(null_statistics),
         n_encounters=int((found["shift"] == 0).sum()),
         respect=fit_radius(smoothed, null.r_max),
-        excluded_below=float(excluded_below),
+        excluded_below=excluded_below,
         sensor=sensor,
         p_beyond=p_beyond,
         null_radius=_fit_null_radius(smoothed, null),
@@ -315,11 +316,11 @@ def null_test(
     )
 
 
-def _compare(found: pd.DataFrame, n_shifts: int) -> tuple[float, NDArray[np.float64]]:
+def _compare(found: pd.DataFrame, n_shifts: int) -> tuple[float, list[float]]:
     """The p-value, and the statistics of the data and of each shift."""
     statistics = _find_deficits(found, 1 + n_shifts)
     p_value = (1 + (statistics[1:] >= statistics[0]).sum()) / (1 + n_shifts)
-    return float(p_value), statistics
+    return float(p_value), statistics.tolist()
 
 
 def _fit_null_radius(found: pd.DataFrame, null: NullEncounters) -> float:
@@ -332,19 +333,16 @@ def _fit_null_radius(found: pd.DataFrame, null: NullEncounters) -> float:
     return max(radii)
 
 
-def _find_deficits(found: pd.DataFrame, shifts: int) -> NDArray[np.float64]:
+def _find_deficits(found: pd.DataFrame, shifts: int) -> Array:
     """Largest deficit of near encounters over all radii, for each shift, in standard deviations.
 
     The expectation for each kind is the share of all shifts together, drawn without replacement.
     """
-    shift, kind = found["shift"].to_numpy(), found["kind"].to_numpy()
-    # the first radius within which each encounter came, and its shift, in one number
-    width = len(RADII) + 1
-    cell = shift * width + np.searchsorted(RADII, found["nearest"], side="right")
+    bins = [np.arange(shifts + 1), np.array([0, *RADII, np.inf])]
     deficit = variance = np.zeros((shifts, len(RADII)))
-    for each in range(kind.max() + 1):
-        count = np.bincount(cell[kind == each], minlength=shifts * width)
-        within = count.reshape(shifts, width).cumsum(axis=1)
+    for _, of_kind in found.groupby("kind"):
+        count = np.histogram2d(of_kind["shift"], of_kind["nearest"], bins)[0]
+        within = count.cumsum(axis=1)
         k, n = within[:, :-1], within[:, -1:]
         total = n.sum()
         share = k.sum(axis=0) / total
@@ -362,15 +360,13 @@ def _warn_about_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:
         return
     data = samples.drop_duplicates("encounter")["kind"].value_counts()
     model = null.encounters["kind"].value_counts()
-    for here, there, name in (
-        (data, model, "the data has"),
-        (model, data, "the null model has"),
-    ):
-        expected = there * here.sum() / max(there.sum(), 1)
-        for kind in expected.index[expected > _MIN_EXPECTED]:
-            if here.get(kind, 0) == 0 and (here is data or kind != COMPANIONS):
+    counts = pd.DataFrame({"the data": data, "the null model": model}).fillna(0)
+    for here, there in permutations(counts):
+        expected = counts[there] * counts[here].sum() / counts[there].sum()
+        for kind in counts.index[(counts[here] == 0) & (expected > _MIN_EXPECTED)]:
+            if here == "the data" or kind != COMPANIONS:
                 warn(
-                    f"{name} no encounter of the kind {kind!r}, {expected[kind]:.0f} were expected; select "
-                    "the same kinds on both sides: szlib.of_kind(samples, kinds) and null.of_kind(kinds)",
+                    f"{here} has no encounter of the kind {kind!r}, {expected[kind]:.0f} were expected; "
+                    "select the same kinds on both sides: szlib.of_kind(samples, kinds), null.of_kind(kinds)",
                     3,
                 )

@@ -102,8 +102,7 @@ def sample(
     while True:
         drawn = multivariate_t.rvs(
             *proposals[-1], _FREEDOM, size=_DRAWN, random_state=rng
-        )
-        drawn = drawn.reshape(_DRAWN, -1)
+        ).reshape(_DRAWN, -1)
         values = np.concatenate([values, drawn])
         log_f = np.append(log_f, [log_inside(p) for p in drawn])
         by_proposal = [multivariate_t.logpdf(values, *p, _FREEDOM) for p in proposals]

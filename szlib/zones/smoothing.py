@@ -25,26 +25,21 @@ def smooth_paths(
     Local polynomials of degree 2 over +-`SMOOTHING` (Savitzky & Golay, 1964) smooth each encounter, but not
     across a gap in time. Straight and evenly curved paths do not change. Without a column `t`, no path does.
     """
-    angle, distance = (
-        samples[column].to_numpy(float),
-        samples["distance"].to_numpy(float),
-    )
+    angle, distance = samples[[column, "distance"]].to_numpy(float).T
     if "t" not in samples:
         return angle, distance
     number, t = encounter_numbers(samples)[0], samples["t"].to_numpy(float)
     order = np.lexsort([t, number])
     path = (distance * np.exp(1j * angle))[order]
-    is_end = (np.diff(number[order]) != 0) | (
-        np.abs(np.diff(t[order]) - _TICK) > _TICK / 2
-    )
+    is_gap = np.abs(np.diff(t[order]) - _TICK) > _TICK / 2
+    is_end = is_gap | (np.diff(number[order]) != 0)
     starts = np.flatnonzero(np.append(True, is_end))
     lengths = np.diff(np.append(starts, len(path)))
     for length in np.unique(lengths[lengths > _DEGREE + 1]):
         rows = starts[lengths == length][:, None] + np.arange(length)
-        path[rows] = path[rows] @ _smoothing_matrix(int(length)).T
-    out = np.empty_like(path)
-    out[order] = path
-    return np.angle(out), np.abs(out)
+        path[rows] = path[rows] @ _smoothing_matrix(length).T
+    path = path[np.argsort(order)]
+    return np.angle(path), np.abs(path)
 
 
 def _smoothing_matrix(length: int) -> Array:

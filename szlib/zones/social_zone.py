@@ -199,8 +199,8 @@ class SocialZone:
         null = null_pairs(
             tracks, area=place, shifts=shifts, seed=seed, r_max=r_max, progress=progress
         )
-        options |= {"r_max": r_max, "seed": seed}
-        return cls.fit(pairs, null=null.of_kind(kinds), **options)
+        null = null.of_kind(kinds)
+        return cls.fit(pairs, null=null, r_max=r_max, seed=seed, **options)
 
     @classmethod
     def fit(
@@ -270,13 +270,8 @@ class SocialZone:
         provenance = _describe_source(samples, estimator, method, r_max)
         test = None
         if null is not None:
-            require(
-                r_max <= null.r_max,
-                "r_max",
-                r_max,
-                f"at most the null model's {null.r_max} m",
-                ZoneError,
-            )
+            farthest = f"at most the null model's {null.r_max} m"
+            require(r_max <= null.r_max, "r_max", r_max, farthest, ZoneError)
             test = null_test(samples, null)
         sides = uncertainty = None
         if "encounter" in samples:
@@ -329,8 +324,7 @@ class SocialZone:
         A DataWarning names the sides that lack encounters. Raises ZoneError, with the speed,
         the range and the missing directions, if the zone is undefined.
         """
-        known = self.ellipses.get(float(speed))
-        ellipse = known if known is not None else self.shape.ellipse(speed)
+        ellipse = self.ellipses.get(float(speed)) or self.shape.ellipse(speed)
         if missing := self.missing_data(speed):
             warn(missing)
         return ellipse
@@ -359,7 +353,7 @@ class SocialZone:
         >>> zone.verdict(1.1).reasons[0]
         'no null model: fit the zone with SocialZone.from_tracks(tracks)'
         """
-        return judge(self, float(speed))
+        return judge(self, speed)
 
     def missing_data(self, speed: float) -> str:
         """Describe the sides that lack encounters at a `speed` [m/s]; "" if none does."""
@@ -370,7 +364,7 @@ class SocialZone:
                 "the quality of the zone is unknown: encounters were not counted by side (an older file, or "
                 "samples without `encounter`); fit it again"
             )
-        return describe_missing_sides(self.side_counts, float(speed))
+        return describe_missing_sides(self.side_counts, speed)
 
     def table(self) -> pd.DataFrame:
         """One row for each fitted speed.
@@ -411,13 +405,10 @@ class SocialZone:
         Its verdicts are for other programs: when the file is read, they are made again. Raises ZoneError if
         the file cannot be written.
         """
-        shape = self.shape
-        content = {
-            "format": FORMAT,
-            "version": VERSION,
-            "units": UNITS,
-            "method": self.method,
-            "r_max": self.r_max,
+        fields = dict(vars(self))
+        shape = fields.pop("shape")
+        content = {"format": FORMAT, "version": VERSION, "units": UNITS} | fields
+        content |= {
             "ellipses": [
                 {
                     "speed": v,
@@ -431,10 +422,6 @@ class SocialZone:
                 {"speed": v, "why": reason}
                 for v, reason in sorted(self.undefined.items())
             ],
-            "provenance": self.provenance,
-            "side_counts": self.side_counts,
-            "uncertainty": self.uncertainty,
-            "null_test": self.null_test,
             "verdicts": [
                 {"speed": v, "verdict": verdict, "reasons": verdict.reasons}
                 for v, verdict in zip(
@@ -514,7 +501,7 @@ def _describe_source(
     n = len(encounter_numbers(samples)[1]) if "encounter" in samples else None
     return {
         "szlib": __version__,
-        "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
+        "days": sorted(map(str, set(samples.get("day", [])))),
         "encounters": n,
         "hours": recorded_hours(samples),
         "parameters": {"method": method, "r_max": float(r_max), **estimator.parameters},
@@ -526,7 +513,7 @@ def recorded_hours(samples: pd.DataFrame) -> float | None:
     """Time from the first to the last of `samples`, summed over the days [h]; None without times."""
     if "t" not in samples or samples.empty:
         return None
-    days = samples["day"] if "day" in samples else np.zeros(len(samples))
+    days = samples.get("day", np.zeros(len(samples)))
     return float(samples["t"].groupby(days, observed=True).agg(np.ptp).sum() / 3600)
 
 
@@ -576,12 +563,13 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         content[name] for name in ("side_counts", "uncertainty", "null_test")
     )
     if uncertainty is not None:
-        tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands")}
-        uncertainty = Uncertainty(**{**uncertainty, **tables})
+        for name in ("intervals", "bands"):
+            uncertainty[name] = _table(uncertainty[name])
+        uncertainty = Uncertainty(**uncertainty)
     if test is not None:
         test["null_statistics"] = tuple(test["null_statistics"])
         test["respect"] = RespectRadius(**test["respect"])
-        if test.get("sensor") is not None:
+        if test.get("sensor"):
             test["sensor"] = SensorCheck(**test["sensor"])
         test = NullTest(**test)
     return {
@@ -590,10 +578,10 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         else HullZone(np.array(hull, float), r_max),
         "r_max": r_max,
         "ellipses": ellipses,
-        "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
+        "undefined": {float(u["speed"]): u["why"] for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
-        "method": str(content["method"]),
-        "side_counts": None if counts is None else _table(counts),
+        "method": content["method"],
+        "side_counts": counts and _table(counts),
         "uncertainty": uncertainty,
         "null_test": test,
     }

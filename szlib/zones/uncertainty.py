@@ -166,9 +166,9 @@ def estimate_uncertainty(
     )
     rng = np.random.default_rng(seed)
     unit, member = resampling_units(estimator.encounters)
-    n = int(member.max()) + 1
+    n = member.max() + 1
     estimate = _quantities(estimator.refit(np.ones((1, len(member))), speeds))
-    posterior = estimator.draw_posterior(speeds)
+    posterior = estimator.posterior(speeds)
     if posterior is not None:
         description = f"posterior: {posterior}"
         drawn = posterior.values[rng.integers(len(posterior.values), size=n_resamples)]
@@ -193,7 +193,7 @@ def estimate_uncertainty(
     intervals, bands = np.split(estimate + ends, [len(QUANTITIES)], axis=-1)
     return Uncertainty(
         LEVEL,
-        int(n_resamples),
+        n_resamples,
         unit,
         description,
         _table(speeds, "quantity", QUANTITIES, intervals),
@@ -222,8 +222,10 @@ def _find_percentiles(differences: Array, corrects_bias: bool = False) -> Array:
         drawn = differences[:, *at]
         known = drawn[~np.isnan(drawn)]
         if len(known) >= (1 - _MAX_FAILED) * len(drawn):
-            below = percentileofscore(known, 0, kind="mean") / 100
-            bias = np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS) * corrects_bias
+            bias = 0.0
+            if corrects_bias:
+                below = percentileofscore(known, 0, kind="mean") / 100
+                bias = np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS)
             levels = norm.cdf(2 * bias + norm.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
             ends[:, *at] = np.quantile(known, levels)
     return ends

@@ -121,8 +121,7 @@ def _null_model(zone: FittedZone) -> Iterator[str]:
             f"{test.grouped:.0%} of the people walk with somebody, and the null model moved each alone: "
             "groups look like respect then; compare every pair, with szlib.find_pairs and szlib.null_pairs"
         )
-    loses_people = test.sensor is not None and test.sensor.loses_people
-    if loses_people and test.p_beyond > SIGNIFICANCE:
+    if test.p_beyond is not None and test.p_beyond > SIGNIFICANCE:
         yield (
             f"the tracker loses people nearer than {test.sensor.resolved:.1f} m to each other "
             f"({test.sensor}), and beyond that no respect shows (p = {test.p_beyond:.2g})"
@@ -135,15 +134,13 @@ def _place(zone: FittedZone, speed: float) -> Iterator[str]:
     resolved = 0.0 if test is None or test.sensor is None else test.sensor.resolved
     shifted = 0.0 if test is None else test.null_radius
     for fitted in find_neighbours(zone.ellipses, speed):
-        low = np.sqrt(np.maximum(_interval(zone, fitted, "area")[0], 0.0) / np.pi)
-        if np.isnan(low):  # `_width` says so
-            continue
+        low = np.sqrt(max(_interval(zone, fitted, "area")[0], 0.0) / np.pi)
         for least, what in (
             (BODY_CONTACT, "two bodies that touch are so near"),
             (resolved, "the tracker loses people who are nearer"),
             (shifted, "people who ignore each other have a radius so large"),
         ):
-            if not low > least:
+            if low <= least:  # without an interval, `_width` says so
                 yield (
                     f"at {fitted:g} m/s the mean radius may be as small as {low:.2f} m, which is not clearly "
                     f"larger than {least:.2f} m: {what}"
@@ -175,10 +172,9 @@ def _width(zone: FittedZone, speed: float) -> Iterator[str]:
                 )
 
 
-def _interval(zone: FittedZone, speed: float, quantity: str) -> tuple[float, float]:
+def _interval(zone: FittedZone, speed: float, quantity: str) -> Any:
     """Low and high end of the interval of a `quantity` at a fitted `speed`; NaN if there is none."""
     if zone.uncertainty is None:
         return np.nan, np.nan
     intervals = zone.uncertainty.intervals.set_index(["speed", "quantity"])
-    low, high = intervals.loc[(speed, quantity), ["low", "high"]]
-    return low, high
+    return intervals.loc[(speed, quantity), ["low", "high"]].to_numpy()

@@ -299,7 +299,7 @@ def test_the_intervals_of_a_round_zone_are_not_those_of_its_longer_and_shorter_a
     round_one = replace(estimator)
     drawn = replace(estimator.draws, values=draws)
     round_one.__dict__.update(best=best, draws=drawn)
-    a, b, angle = round_one.posterior([1.1])[:, 0, 2:].T
+    a, b, angle = round_one.posterior([1.1]).values[:, 0, 2:].T
     assert (a.mean(), b.mean()) == pytest.approx((0.8, 0.8), abs=0.005)
     assert (a < b).mean() == pytest.approx(0.5, abs=0.05)
     assert np.abs(np.sin(angle)) == pytest.approx(float(across > 0))
@@ -316,7 +316,7 @@ def test_the_posterior_is_never_surer_than_the_model_is_right(
         sure.__dict__["draws"] = replace(draws, values=near)
         raw, found = (
             respect_likelihood.zone_ellipses(near, [1.1])[:, 0, :4],
-            sure.posterior([1.1]),
+            sure.posterior([1.1]).values,
         )
         assert found[:, 0, :4].mean(axis=0) == pytest.approx(raw.mean(axis=0))
         least = np.array([0.05, 0.012, 0.05, 0.018])
