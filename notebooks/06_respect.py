@@ -100,7 +100,7 @@ moved = "1 to 10 min, either way; less in a recording of less than 11 min"
 together = "5 s together within 2 m, at equal velocity"
 parameters(
     [
-        ("shift of each person", moved, ASSUMED, "longer than a meeting, shorter than the day's changes"),
+        ("shift of each person, with companions", moved, ASSUMED, "longer than a meeting, shorter than the day's changes"),
         ("null models", shifts, ASSUMED, f"the smallest p-value is 1/{shifts + 1}"),
         ("companions", together, MEASURED, "on people whose groups are known"),
         ("zone of the robot", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
@@ -136,7 +136,8 @@ real_day.compare_with_plaza(
 # seconds earlier or later: they come nearer. Neither swerves, because at these times the two never met.
 #
 # The **null model** does this with everybody, by minutes: each person is moved in time, independently of all others.
-# Every path, every speed and the density of the crowd stay. Only the chance to take notice of each other is lost.
+# *Companions*, who walk together, are moved as one. Every path, every speed and the density of the crowd stay. Only the
+# chance to take notice of each other is lost.
 #
 # (The plaza of this chapter is a busier one: its people are watched for 20 s, not 3.4 s, so that shifted people meet.
 # So some walk beside each other long enough to count as companions. And 2 % of the encounters have an intruder, as in
@@ -179,7 +180,7 @@ for d in (0.3, 0.5, 0.7, 0.9):
 # Which $d$ should we take? We do not choose: we take the largest $z$ over 27 values of $d$, from 0.2 to 1.5 m.
 #
 # The library counts for each *kind* of encounter, and adds up: people who cross are compared with people who cross.
-# The reason: a shift in time changes the share of each kind as well. It tears people apart who walk in one direction.
+# The reason: a shift in time changes the share of each kind as well. It parts strangers who walk in one direction.
 
 # %% [markdown]
 # ## Is it respect at all?
@@ -380,15 +381,15 @@ Markdown(
 
 Two people who walk together keep a distance as well, but another one, for another reason. So *companions* are found
 first, on the whole common track of the two, and left out: {with_companions} here. In a shifted crowd it is
-{by_chance.get("companions", 0):.1f} of {by_chance.sum():.0f}: by chance hardly anybody walks together."""
+{by_chance.get("companions", 0):.1f} of {by_chance.sum():.0f}: they are moved as one, so they stay companions."""
 )
 
 # %% [markdown]
 # ## The zone of the robot
 #
 # The encounters of chapter 02 are *lone*: nobody else is near. In a crowd hardly anybody is alone, so most data has few of
-# them. And our null model moved each person alone. That tears groups apart, and people who walk in groups then look as if
-# they respected others. So the robot's zone is made in another way:
+# them. And our null model moved strangers apart who walk one behind the other, in a queue or from a train. These then look
+# as if they kept a distance from each other. So the robot's zone is made in another way:
 #
 # - it takes **every pair** of people who come towards each other or cross, each pair once, whoever else is near;
 # - its null model moves whole **streams**: all people who walk in about the same direction are moved together in time, and

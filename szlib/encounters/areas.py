@@ -99,6 +99,7 @@ def place_apart(tracks: pd.DataFrame) -> pd.DataFrame:
     Days of a calendar stay where they are: they are of one place.  Where `tracks` are of one place, they are
     returned themselves.
     """
+    check_columns(tracks, COLUMNS)
     places = _find_places(tracks)
     if places.nunique() < 2:
         return tracks

@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,13 +38,12 @@ from ..core.input_files import (
 from ..core.parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.clock import read_tracks, to_clock
-from ..tracks.readers import find_day, find_format, name_recordings
+from ..tracks.readers import find_day, find_format, name_recordings, read_raw
 from ..tracks.recipe import Recipe, find_recipe
 from .areas import AUTO, as_area, has_calendar
 from .finding import find_encounters, find_place
 from .geometry import Area, AttentionalSpace
-from .near_rows import read_near_area
-from .samples import no_samples
+from .near_rows import select_near
 from .settings import EncounterSettings
 
 # Advice by a word of the condition that rejected everything; the last one fits all others.
@@ -59,10 +59,9 @@ _ADVICE = {
     "": "more data, or other conditions (szlib.find_encounters)",
 }
 # of the cached result of a day; a result of another version is computed again
-_VERSION = 9
+_VERSION = 10
 # purpose of an extraction's folder, as its marker states it
 PURPOSE = "encounters by day"
-_READ = "read all files"  # the first stage of the funnel of many days
 # a row of the table of days, of an excluded one
 _ROW: dict[str, Any] = {
     "day": "",
@@ -85,8 +84,8 @@ def read_for_encounters(
     `settings` say what counts as an encounter, `recipe` how the files are read.  `szlib.find_encounters`
     finds the same encounters in them as in ``szlib.read_tracks(files)``.
     """
-    raw = read_near_area(files, settings, recipe)
-    return to_clock(raw, max_gap=recipe.max_gap) if len(raw) else raw
+    raw = read_raw(files, recipe=recipe, select=partial(select_near, settings))
+    return to_clock(raw, max_gap=recipe.max_gap)
 
 
 def find_area(
@@ -153,7 +152,9 @@ def _add_stages(samples: Iterable[pd.DataFrame]) -> list[dict[str, Any]]:
     """The funnels of several `samples`, added up as if their files had been read together."""
     return funnels.add(
         [
-            stage | {"stage": _READ} if stage["stage"].startswith("read ") else stage
+            stage | {"stage": "read all files"}
+            if stage["stage"].startswith("read ")
+            else stage
             for stage in funnels.get(each)
         ]
         for each in samples
@@ -358,8 +359,9 @@ def extract_days(
         for day in included
     ]
     found = run_tasks(tasks, n_jobs=n_jobs)
-    is_hidden = None if progress else True  # None: shown in a terminal
-    rows = list(tqdm(found, total=len(tasks), unit="day", disable=is_hidden))
+    # With disable=None the bar is shown in a terminal.
+    hidden = None if progress else True
+    rows = list(tqdm(found, total=len(tasks), unit="day", disable=hidden))
     for day in days.keys() & excluded:
         rows.append(_ROW | {"day": day, "files": len(days[day])})
     table = pd.DataFrame(rows, columns=list(_ROW)).sort_values("day", ignore_index=True)
@@ -397,9 +399,7 @@ def extract_day(
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
                     tracks = read_for_encounters(files, settings, recipe)
-                    samples = funnels.attach(no_samples(), funnels.get(tracks))
-                    if len(tracks):
-                        samples = find_encounters(tracks, settings=settings)
+                    samples = find_encounters(tracks, settings=settings)
             begins = {find_day(file, recipe) or day for file in files}
         source = described.result()
         if begins != {day} or expected not in (None, source):

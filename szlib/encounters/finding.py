@@ -21,7 +21,6 @@ import numpy as np
 import pandas as pd
 
 from ..tracks import funnels
-from ..tracks.clock import clock_index
 from .areas import AUTO, area_for, place_apart
 from .geometry import Area
 from .kinds import REACH, kinds_of_pairs, of_kind
@@ -109,7 +108,6 @@ def find_place(
     if area is None:
         area = tracks.attrs.get("area", AUTO)
     if isinstance(area, str) and area == AUTO:
-        clock_index(tracks)  # raises DataError for a table that is no track table
         tracks = place_apart(tracks)
     return tracks, area_for(tracks, area, settings.space)
 
@@ -174,7 +172,7 @@ def _check_windows(
     for reason, condition in throughout.items():
         failures = np.cumsum(~condition)  # the opening itself was checked
         found[reason] = failures[last] == failures[first]
-    valid = np.logical_and.reduce(list(found.values()))
+    valid = np.all(list(found.values()), axis=0)
     return found | {"overlaps an earlier window": _drop_overlaps(first, valid, steps)}
 
 

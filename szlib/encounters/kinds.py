@@ -106,17 +106,16 @@ def find_units(rows: TrackRows, whole: np.ndarray) -> np.ndarray:
     pairs = np.sort(rows.person[whole][np.concatenate(list(found), axis=1)], axis=0)
     pairs, seconds = np.unique(pairs, axis=1, return_counts=True)
     pairs = pairs[:, seconds >= TOGETHER - 1]
-    kinds = kinds_of_pairs(pairs, rows, np.ones(len(rows), bool))
-    a, b = pairs[:, np.asarray(kinds == COMPANIONS)]
+    a, b = pairs[:, np.asarray(kinds_of_pairs(pairs, rows) == COMPANIONS)]
     n = rows.person[-1] + 1
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def kinds_of_pairs(
-    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray
+    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray | bool = True
 ) -> pd.Categorical:
-    """Decide the kinds of pairs of people from the `rows` that count (`counts`, one for each row).
+    """Decide the kinds of pairs of people from the `rows` that count (`counts`, one for each row, or all).
 
     `pairs` are the numbers of the two people of each pair, (2, n).
     """
@@ -151,13 +150,13 @@ def classify_motion(
     turn = np.nan_to_num(rows.velocity[both[0]].conj() * rows.velocity[both[1]])
     along, across = (np.bincount(pair, part, n) for part in (turn.real, turn.imag))
     angle = np.abs(np.arctan2(across, along))
-    found = [KINDS.index(kind) for kind in (STANDING, SAME, OPPOSITE, CROSSING)]
+    standing, same, opposite, crossing = range(1, len(KINDS))
     rules = [stands, angle <= ALONG, angle >= np.pi - ALONG]
-    return np.select(rules, found[:3], found[3]).astype(np.int8)
+    return np.select(rules, [standing, same, opposite], crossing)
 
 
 def _common_track(
-    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray
+    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray | bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Every tick at which the rows of both people of a pair count: the pair's number, and the two rows."""
     row = np.flatnonzero(counts & np.isin(rows.person, pairs))

@@ -31,7 +31,7 @@ from ..tracks.clock import TICKS_PER_SECOND, compute_velocities
 from .finding import find_encounters, find_place
 from .kinds import find_units, name_kinds, of_kind
 from .occupants import TrackRows
-from .pairs import CLOSE, COMPARED, Crowd
+from .pairs import CLOSE, COMPARED, SECTORS, Crowd
 from .sensor import SensorCheck
 from .settings import EncounterSettings
 
@@ -79,8 +79,8 @@ def time_shifted(
     """
     rows = TrackRows.from_tracks(tracks)
     leader, seconds = _find_leaders(rows)
-    shift = _draw(seconds, minutes, np.random.default_rng(seed))[leader]
-    return _move(tracks, rows, shift, rows.recorded)
+    shift = _draw(seconds, minutes, np.random.default_rng(seed))
+    return _move(tracks, rows, shift[leader], rows.recorded)
 
 
 def _find_leaders(rows: TrackRows) -> tuple[np.ndarray, np.ndarray]:
@@ -162,9 +162,10 @@ class NullEncounters:
     def of_kind(self, kinds: str | Iterable[str] | None) -> NullEncounters:
         """The encounters of some `kinds`, as `szlib.of_kind`: treat data and null model alike."""
         names = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
-        samples, encounters = self.samples, self.encounters
         return replace(
-            self, samples=of_kind(samples, names), encounters=of_kind(encounters, names)
+            self,
+            samples=of_kind(self.samples, names),
+            encounters=of_kind(self.encounters, names),
         )
 
 
@@ -213,7 +214,7 @@ def null_encounters(
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     tracks, area = find_place(tracks, settings)
     settings = replace(settings, area=area)
-    rows = TrackRows.from_tracks(tracks)
+    rows, crowd = TrackRows.from_tracks(tracks), Crowd.from_tracks(tracks, area)
     leader, seconds = _find_leaders(rows)
     # Encounters depend on nobody who is never in the area.
     visitors = rows.select(np.isin(rows.person, rows.person[rows.within(area)]))
@@ -228,10 +229,9 @@ def null_encounters(
         close = funnels.select(samples, is_near, "samples: close", far)
         return close, nearest.reset_index()
 
-    made_by = {"moved": "units", "shifts": shifts, "seed": seed}
-    parameters = {**made_by, "minutes": list(minutes), **settings.as_json()}
-    sensor = Crowd.from_tracks(tracks, area).sensor
-    null = _search(find, shifts, r_max, parameters, sensor, progress)
+    drawn_by = {"shifts": shifts, "seed": seed, "minutes": list(minutes)}
+    parameters = {"moved": "units", **drawn_by, **settings.as_json()}
+    null = _search(find, shifts, r_max, parameters, crowd.sensor, progress)
     return null.of_kind(kinds)
 
 
@@ -275,9 +275,10 @@ def null_pairs(
     """
     tracks, place = find_place(tracks, EncounterSettings(area=area))
     crowd, rng = Crowd.from_tracks(tracks, place), np.random.default_rng(seed)
+    seconds = np.repeat(crowd.rows.recorded[1], SECTORS)
 
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
-        met = crowd.meet(r_max, _draw(crowd.seconds, minutes, rng))
+        met = crowd.meet(r_max, _draw(seconds, minutes, rng))
         counted = stored = met.compared
         if len(counted) > (quota := -(-_STORED // shifts)):
             stored = np.sort(rng.choice(counted, quota, replace=False))
@@ -285,8 +286,13 @@ def null_pairs(
         every = pd.DataFrame({"encounter": counted, "kind": kind, "nearest": nearest})
         return crowd.sample(tracks, met, stored, r_max), every
 
-    made_by = {"minutes": list(minutes), "kinds": list(COMPARED), "area": str(place)}
-    parameters = {"moved": "streams", "shifts": shifts, "seed": seed, **made_by}
+    drawn_by = {"shifts": shifts, "seed": seed, "minutes": list(minutes)}
+    parameters = {
+        "moved": "streams",
+        **drawn_by,
+        "kinds": list(COMPARED),
+        "area": str(place),
+    }
     return _search(find, shifts, r_max, parameters, crowd.sensor, progress)
 
 

@@ -97,8 +97,8 @@ class TrackRows:
     @cached_property
     def moment(self) -> np.ndarray:
         """Number of the moment, a tick of a day, of each row."""
-        tick = self.tick - self.tick.min(initial=0)
-        return np.asarray(self.day * (np.int64(tick.max(initial=0)) + 1) + tick)
+        tick = self.tick - self.tick.min()
+        return np.asarray(self.day * (tick.max() + 1) + tick)
 
     def __len__(self) -> int:
         return len(self.tick)

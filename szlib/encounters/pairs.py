@@ -49,7 +49,7 @@ from .sensor import (
     NEAR_END,
     SensorCheck,
     count_ends,
-    is_exchanged,
+    count_exchanged,
     measure_noise,
 )
 from .settings import EncounterSettings
@@ -117,11 +117,10 @@ def find_pairs(
 def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
     """How many pairs of `tracks` in an `area` are compared with chance, and what they say of the sensor."""
     crowd = Crowd.from_tracks(tracks, area)
-    n = len(crowd.close.compared)
     resolved = crowd.sensor.resolved
     loses = f"loses people who are nearer than {resolved:.1f} m to each other"
     return (
-        f"pairs who come towards each other or cross, within {CLOSE:g} m: {n:,}\n"
+        f"pairs who come towards each other or cross, within {CLOSE:g} m: {len(crowd.close.compared):,}\n"
         f"sensor: it {loses if resolved else 'resolves people at every distance'}: {crowd.sensor}"
     )
 
@@ -189,11 +188,6 @@ class Crowd:
         return find_units(self.rows, self.coarse)
 
     @cached_property
-    def seconds(self) -> np.ndarray:
-        """Length of the day of each stream [s]."""
-        return np.repeat(self.rows.recorded[1], SECTORS)
-
-    @cached_property
     def stream(self) -> np.ndarray:
         """Number of the stream of each person; each day has its own."""
         rows, unit = self.rows, self.unit[self.rows.person]
@@ -217,16 +211,13 @@ class Crowd:
         """What the tracks say about the sensor."""
         met, rows = self.close, self.rows
         near = self._near_rows(met, np.flatnonzero(met.kind > 0), CLOSE)
-        pairs = near[["one", "other"]].to_numpy().T
-        found = count_ends(rows, self.inside, *pairs)
+        found = count_ends(rows, self.inside, near[["one", "other"]].to_numpy().T)
         found |= measure_noise(rows, self.inside)
         passing = met.rows[:, (met.kind > _STANDING) & (met.nearest < NEAR_END)]
         ends, known = self._along(passing, np.array([-BEFORE, BEFORE]))
-        before, after = ends[:, known.all(axis=1)].T
-        exchanged = is_exchanged(rows, before, after)
-        return SensorCheck(
-            **found, passes=len(exchanged), exchanged=int(exchanged.sum())
-        )
+        velocity = rows.velocity[ends[:, known.all(axis=1)]]
+        exchanged = count_exchanged(velocity[..., 0], velocity[..., 1])
+        return SensorCheck(**found, passes=velocity.shape[1], exchanged=exchanged)
 
     def meet(self, r_max: float, shifts: np.ndarray | None = None) -> Meetings:
         """Find the pairs of people within `r_max` [m].
@@ -317,7 +308,7 @@ class Crowd:
         (unit, own), (stream, other) = self.unit[pairs], self.stream[pairs]
         rules = [unit == own, (stream == other) & (codes != _STANDING)]
         names = [KINDS.index(kind) for kind in (COMPANIONS, SAME)]
-        return np.select(rules, names, codes).astype(np.int8)
+        return np.select(rules, names, codes)
 
     def _third_people(
         self, near: np.ndarray, at: np.ndarray, r_max: float

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
 from ..tracks.clock import TICKS_PER_SECOND
 from .geometry import wrap_angle
-from .kinds import KINDS
 from .occupants import TrackRows
 
 SAMPLE_COLUMNS = [
@@ -46,11 +43,3 @@ def sample_rows(
         rows.speed[other],
     ]
     return pd.DataFrame(dict(zip(SAMPLE_COLUMNS, columns, strict=True)))
-
-
-def no_samples() -> pd.DataFrame:
-    """A table of samples, with their kind, without a row."""
-    types: dict[str, Any] = dict.fromkeys(SAMPLE_COLUMNS, "float64")
-    types |= dict.fromkeys(("encounter", "ref_id", "other_id"), "int64")
-    types |= {"day": "category", "kind": pd.CategoricalDtype(list(KINDS))}
-    return pd.DataFrame(columns=list(types)).astype(types)

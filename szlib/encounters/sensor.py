@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.stats import beta, quantile_test
 
 from .occupants import TrackRows
@@ -116,7 +115,7 @@ class SensorCheck:
 
 
 def count_ends(
-    rows: TrackRows, inside: np.ndarray, one: np.ndarray, other: np.ndarray
+    rows: TrackRows, inside: np.ndarray, pairs: np.ndarray
 ) -> dict[str, Any]:
     """Compare the ends of tracks with all samples: the fields of `SensorCheck` from ends to resolved.
 
@@ -124,13 +123,13 @@ def count_ends(
     ----------
     rows : of the tracks, by person and time.
     inside : whether each of them is in the area.
-    one, other : rows of two strangers at one moment who are near each other, shape (n,).
+    pairs : rows of two strangers at one moment who are near each other, shape (2, n).
     """
     breaks = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
     recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
     is_end = (np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded
-    nearest, distance = np.full(len(rows), np.inf), rows.distance(one, other)
-    for each in (one, other):
+    nearest, distance = np.full(len(rows), np.inf), rows.distance(*pairs)
+    for each in pairs:
         np.minimum.at(nearest, each, distance)
     ends, samples = nearest[is_end], nearest[inside]
     n, (near, common) = len(ends), (np.histogram(d, _EDGES)[0] for d in (ends, samples))
@@ -186,16 +185,10 @@ def _differences(
     return np.asarray(rows.place[at[:, None] + steps] @ weights)
 
 
-def is_exchanged(
-    rows: TrackRows, before: np.ndarray, after: np.ndarray
-) -> NDArray[np.bool_]:
-    """Whether two people go on as the other did before.
-
-    `before` and `after` are the numbers of their `rows` before and after they pass, each (n, 2).
-    """
-    was, goes = rows.velocity[before], rows.velocity[after]
-    own, exchanged = (np.abs(goes - each).sum(axis=1) for each in (was, was[:, ::-1]))
-    return np.asarray((own > _TURNED) & (exchanged < _LEFT_OVER * own))
+def count_exchanged(before: np.ndarray, after: np.ndarray) -> int:
+    """How many pairs go on as the other did; velocities `before` and `after` they pass, (2, n) [m/s]."""
+    own, exchanged = (np.abs(after - v).sum(axis=0) for v in (before, before[::-1]))
+    return int(((own > _TURNED) & (exchanged < _LEFT_OVER * own)).sum())
 
 
 def _share(is_so: np.ndarray) -> float:

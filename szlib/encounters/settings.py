@@ -54,7 +54,7 @@ class EncounterSettings:
     >>> szlib.EncounterSettings(duration=0.25)
     Traceback (most recent call last):
     ...
-    szlib.core.errors.DataError: duration must be a multiple of 0.1 s, the step of the clock; got 0.25
+    szlib.core.errors.DataError: duration must be a multiple of 0.1 s, ...; got 0.25
     """
 
     area: object = None
@@ -70,8 +70,13 @@ class EncounterSettings:
         if self.area is not None:
             object.__setattr__(self, "area", AUTO if automatic else as_area(self.area))
         duration = self.duration
-        expected = f"positive and shorter than {_LONGEST_WINDOW:g} s"
-        require(0 < duration < _LONGEST_WINDOW, "duration", duration, expected)
+        require(
+            0 < duration < _LONGEST_WINDOW
+            and abs(duration * TICKS_PER_SECOND - self.steps) <= 1e-6,
+            "duration",
+            duration,
+            f"a multiple of 0.1 s, the step of the clock, and shorter than {_LONGEST_WINDOW:g} s",
+        )
         require(
             0 <= self.min_distance < np.inf,
             "min_distance",
@@ -80,13 +85,6 @@ class EncounterSettings:
         )
         require(
             0 < self.min_speed < np.inf, "min_speed", self.min_speed, "positive [m/s]"
-        )
-        is_multiple = abs(duration * TICKS_PER_SECOND - self.steps) <= 1e-6
-        require(
-            is_multiple,
-            "duration",
-            duration,
-            "a multiple of 0.1 s, the step of the clock",
         )
 
     @property

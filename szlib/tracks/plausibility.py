@@ -21,6 +21,7 @@ from .shapes import SHAPES
 
 # widest site [m]; a smaller site [m] means that metres were read as millimetres
 _SITES = (0.5, 1000.0)
+_MANY = 1_000_000  # rows that tell the size of a site
 # greatest median and greatest 90 % quantile of the speed of people [m/s]
 _FASTEST = (3.0, 6.0)
 # smallest and greatest 90 % quantile of the speed where people certainly walk [m/s]
@@ -147,9 +148,10 @@ def check_people(
 
 def check_unit(rows: pl.DataFrame, recipe: Recipe, path: Path) -> None:
     """Raise DataError where `rows` x, y [m] of file `path`, read with a `recipe`, span an impossible site."""
-    positions, metres = rows.select("x", "y").to_numpy(), recipe.metres or 1.0
-    reach = float(np.abs(positions).max())
-    spread = float(np.ptp(np.quantile(positions, [0.01, 0.99], axis=0), axis=0).max())
+    places, metres = rows.select("x", "y"), recipe.metres or 1.0
+    reach = float(places.select(pl.all().abs().max()).to_numpy().max())
+    some = places.gather_every(places.height // _MANY + 1)
+    spread = float(np.ptp(np.quantile(some, [0.01, 0.99], axis=0), axis=0).max())
     is_small = metres < 1 and reach < _SITES[0]
     if is_small or (metres == 1 and spread > _SITES[1]):
         unit, other = ("m", "mm") if is_small else ("mm", "m")

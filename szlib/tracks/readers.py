@@ -6,7 +6,7 @@ A file that cannot be used raises a DataError that names the file and the line.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from math import ceil
@@ -85,8 +85,16 @@ class LoadedFile(NamedTuple):
         return self._replace(rows=self.rows.with_columns(day=day))
 
 
+Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
+"""The needed rows of some, given their area and the longest gap within a track [s]."""
+
+
 def read_raw(
-    paths: Any, *, recipe: Recipe | None = None, exclude: Iterable[str] = ()
+    paths: Any,
+    *,
+    recipe: Recipe | None = None,
+    exclude: Iterable[str] = (),
+    select: Select | None = None,
 ) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
@@ -95,6 +103,7 @@ def read_raw(
     paths : as in `szlib.read_tracks`.
     recipe : how files are read; None takes that beside the files, or finds one.
     exclude : days "YYYY-MM-DD" to leave out.
+    select : a function of the rows, their area and longest gap [s], that gives those that are needed.
 
     Returns
     -------
@@ -130,15 +139,17 @@ def read_raw(
         _read_file(source, path, recipe)
         for source, path in zip(sources, names, strict=True)
     ]
-    return merge(separate_recordings(files), excluded)
+    return merge(separate_recordings(files), excluded, select)
 
 
 def merge(
-    files: Sequence[LoadedFile], excluded: Sequence[str] = (), *, copy: bool = True
+    files: Sequence[LoadedFile],
+    excluded: Sequence[str] = (),
+    select: Select | None = None,
 ) -> pd.DataFrame:
     """Merge the rows of `files` into one table as from `read_raw`: sorted, without duplicates.
 
-    Days `excluded` are left out.  Without `copy` the table may share the memory of the rows.
+    Days `excluded` are left out, and rows that `select` leaves out.
     """
     parts = [file.rows for file in files]
     if len({part.schema["day"] for part in parts}) > 1:
@@ -149,8 +160,13 @@ def merge(
         if excluded
         else merged
     )
+    gaps = [file.recipe.max_gap for file in files if file.recipe.max_gap is not None]
+    max_gap = max(gaps) if len(gaps) == len(files) else None
+    areas = {file.recipe.area for file in files}
+    area = areas.pop() if len(areas) == 1 else None
+    near = wanted if select is None else select(wanted, area, max_gap)
     keys = ["day", "id", "t"]
-    rows = _sort(wanted)
+    rows = _sort(near)
     again = pl.all_horizontal(pl.col(keys).eq_missing(pl.col(keys).shift()))
     elsewhere = again & pl.any_horizontal(pl.col("x", "y").diff() != 0)
     if rows.select(again.any()).item():
@@ -162,14 +178,14 @@ def merge(
                 "without their fraction are not enough"
             )
         rows = rows.filter(~again)
-    doubled = {"duplicate (day, id, t)": wanted.height - rows.height}
+    doubled = {"duplicate (day, id, t)": near.height - rows.height}
     _warn_rejected("all files", doubled)
     if rows.height == 0:
         raise DataError(
             f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`"
         )
     frame = pd.DataFrame(
-        {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}, copy=copy
+        {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}
     )
     days = rows["day"].unique().sort()
     codes = (
@@ -179,13 +195,12 @@ def merge(
     )
     names = pd.Index(days.cast(pl.String).to_list())
     frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, names)))
-    gaps = [file.recipe.max_gap for file in files if file.recipe.max_gap is not None]
-    frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(files) else None
-    areas = {file.recipe.area for file in files}
-    if len(areas) == 1 and (area := areas.pop()) is not None:
+    frame.attrs["max_gap"] = max_gap
+    if area is not None:
         frame.attrs["area"] = area
     frame.attrs["recipe"] = files[0].recipe.as_json()
-    reasons = {"excluded day": merged.height - wanted.height, **doubled}
+    far = {"never near the area": wanted.height - near.height}
+    reasons = {"excluded day": merged.height - wanted.height, **far, **doubled}
     stages = [stage for file in files for stage in file.stages]
     for text in find_implausible(rows):
         warn(f"{', '.join(file.path.name for file in files[:3])}: {text}")
@@ -271,11 +286,6 @@ def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:
         usable = scan.filter(rejection_reason(scan).is_null())
         rows = usable.head(MOST_SHOWN).select("t", "id", "x", "y").collect()
     return describe_rows(rows, found, path.name), found
-
-
-def is_streamed(path: Path, recipe: Recipe) -> bool:
-    """Whether file `path` is read in blocks with a `recipe`."""
-    return SHAPES[find_format(path, recipe).file_format or "tidy"].is_streamed
 
 
 def find_format(path: Path, recipe: Recipe) -> Recipe:

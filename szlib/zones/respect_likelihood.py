@@ -61,7 +61,7 @@ _BANK = 24  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
 # number of best circles tried, and the least difference of their radii [m]
 _STARTS, _START_GAP = 3, 0.15
-_RESTARTS = 10
+_RESTARTS = 20
 # How far back the centre is moved to look for another peak [m], and the least gain in log density for which
 # it is moved on.
 _BACK, _GAIN = ((-0.15, -0.1, -0.05, 0.05, 0.1, 0.15), 0.5)

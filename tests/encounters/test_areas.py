@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 import shapely
 from helpers.encounter_tables import ROOM, assert_same_samples
-from helpers.raw_days import assert_streamed_as_whole, make_raw_day, write_raw_day
+from helpers.raw_days import assert_selected_as_whole, make_raw_day, write_raw_day
 from helpers.track_tables import make_crowd, make_hall, make_tracks, make_walk
 from hypothesis import given, strategies
 from matplotlib.path import Path as Outline
@@ -330,7 +330,7 @@ def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(
         path = write_raw_day(
             tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0)
         )
-        found += assert_streamed_as_whole(
+        found += assert_selected_as_whole(
             path, square=szlib.as_area(shape), duration=1.0
         )
     assert found > 0

@@ -80,21 +80,16 @@ def test_samples_of_days_equal_those_of_one_table(
     entered, kept = sum(s["entered"] for s in read), sum(s["kept"] for s in read)
     assert entered == sum(len(day.read_text().splitlines()) for day in days)
     assert kept == next(
-        s["entered"] for s in funnels.get(ours) if s["stage"] == "near the area"
+        s["entered"] for s in funnels.get(ours) if s["stage"] == "merge files"
     )
 
 
-def test_result_does_not_depend_on_order_processes_or_blocks(
-    days: list[Path],
-    reference: dict[str, bytes],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+def test_result_does_not_depend_on_order_or_processes(
+    days: list[Path], reference: dict[str, bytes], tmp_path: Path
 ) -> None:
     extract(days[::-1], tmp_path / "reversed")
     extract(str(days[0].parent / "*.csv"), tmp_path / "two", n_jobs=2)
-    monkeypatch.setattr("szlib.encounters.near_rows._BLOCK_ROWS", 700)
-    extract([days[0].parent], tmp_path / "blocks")
-    for name in ("reversed", "two", "blocks"):
+    for name in ("reversed", "two"):
         assert contents(tmp_path / name) == reference
     zones = [
         szlib.SocialZone.fit(
@@ -190,7 +185,7 @@ def test_rows_are_of_the_bytes_of_their_checksum(
         (tmp_path / name).mkdir()
         (tmp_path / name / days[0].name).write_bytes(day.read_bytes())
     file, known = tmp_path / "data" / days[0].name, threading.Event()
-    describe, read = extraction.describe_source, extraction.read_near_area
+    describe, read = extraction.describe_source, extraction.read_raw
 
     def describe_first(*given: Any) -> dict[str, Any]:
         try:
@@ -204,7 +199,7 @@ def test_rows_are_of_the_bytes_of_their_checksum(
             return read(*given, **options)
 
     monkeypatch.setattr(extraction, "describe_source", describe_first)
-    monkeypatch.setattr(extraction, "read_near_area", read_the_other)
+    monkeypatch.setattr(extraction, "read_raw", read_the_other)
     done = extract(file, tmp_path / "out")
     stored = {
         name: content
