@@ -100,7 +100,7 @@ moved = "1 to 10 min, either way; less in a recording of less than 11 min"
 together = "5 s together within 2 m, at equal velocity"
 parameters(
     [
-        ("shift of each person, with companions", moved, ASSUMED, "longer than a meeting, shorter than the day's changes"),
+        ("shift of each person", moved, ASSUMED, "longer than a meeting, shorter than the day's changes"),
         ("null models", shifts, ASSUMED, f"the smallest p-value is 1/{shifts + 1}"),
         ("companions", together, MEASURED, "on people whose groups are known"),
         ("zone of the robot", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),

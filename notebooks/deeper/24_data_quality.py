@@ -288,14 +288,14 @@ extraction.table[["day", "files", "rows", "unusable", "encounters"]].head(7)
 # zone = szlib.SocialZone.fit(days.samples())
 # ```
 #
-# A raw day of 1 GB is streamed: only rows near the area are kept in memory, and the encounters are bit for bit those of
-# the whole day. Files and parameters identify a day. A run that was stopped resumes, and a day that fails does not stop
-# the others.
+# Of a raw day of 1 GB only the rows near the area are sorted and brought to the clock, and the encounters are bit for bit
+# those of the whole day. Files and parameters identify a day. A run that was stopped resumes, and a day that fails does not
+# stop the others.
 
 # %% [markdown]
 # | where | how |
 # |---|---|
-# | laptop | `--jobs 2`; each process needs up to 1 GB, or 180 bytes for each row near the area where that is more |
+# | laptop | `--jobs 2`; each process needs about 1.5 GB for a raw day of 1 GB |
 # | workstation | `--jobs 16`; set `POLARS_MAX_THREADS=2`, so that processes do not compete for cores |
 # | machines with SSH, or SLURM | [many_days.py](../examples/many_days.py): `python many_days.py ssh HOST1,HOST2 atc/ out`, or `slurm 20 atc/ out` |
 # | any Dask scheduler | `szlib extract atc/ --out days --scheduler tcp://HOST:8786 --wait 600`: workers may come ten minutes later |

@@ -23,7 +23,7 @@ from szlib.core.checks import Array, check_columns, require
 from szlib.core.errors import ZoneError
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.kinds import WALKING
-from szlib.encounters.null_model import time_shifted
+from szlib.encounters.null_model import MINUTES, time_shifted
 from szlib.encounters.samples import SAMPLE_COLUMNS
 from szlib.encounters.settings import EncounterSettings
 from szlib.tracks import funnels
@@ -37,7 +37,7 @@ def impose_zone(
     *,
     careless: float = 0.0,
     seed: int | Sequence[int] = 0,
-    minutes: tuple[float, float] | None = None,
+    minutes: tuple[float, float] = MINUTES,
     settings: EncounterSettings | None = None,
     kinds: str | Iterable[str] | None = None,
     **parameters: Any,

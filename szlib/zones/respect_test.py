@@ -217,7 +217,6 @@ class NullTest:
     sensor : what the data says about the sensor; None: not looked at.
     p_beyond : p-value of the encounters beyond the distance that the sensor resolves, where it loses people.
     null_radius : the largest radius that the same fit gives one of some shifts against the others [m].
-    grouped : share of the people who walk with somebody, where the null model moved each of them alone.
 
     Examples
     --------
@@ -239,7 +238,6 @@ class NullTest:
     sensor: SensorCheck | None = None
     p_beyond: float | None = None
     null_radius: float = 0.0
-    grouped: float = 0.0
 
     @property
     def n_shifts(self) -> int:
@@ -312,7 +310,6 @@ def null_test(
         sensor=sensor,
         p_beyond=p_beyond,
         null_radius=_fit_null_radius(smoothed, null),
-        grouped=float(null.parameters.get("grouped", 0.0)),
     )
 
 

@@ -22,8 +22,6 @@ USABLE, UNDECIDED, NO_RESPECT = "usable", "undecided", "no respect shown"
 MIN_TOTAL = 600
 # Largest share of careless people, unless the method states its own: then most people keep the zone.
 MOST_CARELESS = 0.2
-# Largest share of people in groups where the null model moves each person alone (70 % fake respect).
-MOST_GROUPED = 0.1
 # Distance of two people whose bodies touch, shoulder to shoulder or chest to chest [m] (assumed).
 BODY_CONTACT = 0.4
 # Widest interval of a semi-axis, as a share of it.
@@ -115,11 +113,6 @@ def _null_model(zone: FittedZone) -> Iterator[str]:
         yield (
             f"up to {test.respect.careless_high:.1%} of the encounters may be of careless people who enter "
             f"the zone; it holds only if these are fewer than q = {limit:.1%}"
-        )
-    if test.grouped > MOST_GROUPED:
-        yield (
-            f"{test.grouped:.0%} of the people walk with somebody, and the null model moved each alone: "
-            "groups look like respect then; compare every pair, with szlib.find_pairs and szlib.null_pairs"
         )
     if test.p_beyond is not None and test.p_beyond > SIGNIFICANCE:
         yield (

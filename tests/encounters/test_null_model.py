@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from benchmarks.truth import crowds
 from helpers.track_tables import make_tracks, make_walk
 from studies.noninteracting_crowd import noninteracting_crowd
 
@@ -120,3 +121,19 @@ def test_the_real_day(real_tracks: pd.DataFrame) -> None:
     np.testing.assert_array_equal(
         null.encounters["kind"], whole.groupby("encounter")["kind"].first()
     )
+
+
+def test_groups_do_not_look_like_respect() -> None:
+    """Lone encounters of people of whom 70 % walk in groups abreast, and nobody reacts to anybody."""
+    found = []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        people = crowds.as_table(crowds.CROWDS["groups"](rng, 1500, 4500))
+        place = {"area": crowds.AREA}
+        tracks = crowds.read(people, rng)
+        samples = szlib.of_kind(szlib.find_encounters(tracks, **place), "strangers")
+        null = szlib.null_encounters(tracks, shifts=19, progress=False, **place)
+        test = szlib.null_test(samples, null.of_kind("strangers"))
+        assert test.n_encounters > 20
+        found.append(test.p_value)
+    assert min(found) > 0.05

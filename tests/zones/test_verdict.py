@@ -165,15 +165,6 @@ def test_a_zone_no_larger_than_that_of_people_who_ignore_each_other_is_undecided
     assert "larger than 1.50 m: people who ignore each other" in verdict.sentence
 
 
-def test_groups_that_were_moved_one_by_one_are_undecided(
-    careful: szlib.SocialZone,
-) -> None:
-    test = replace(careful.null_test, grouped=0.7)
-    verdict = replace(careful, null_test=test).verdict(SPEED)
-    assert verdict == "undecided"
-    assert "compare every pair, with szlib.find_pairs" in verdict.sentence
-
-
 @pytest.mark.parametrize(
     ("quantity", "low", "high", "reason"),
     [
