@@ -89,11 +89,13 @@ def find_encounters(
     samples["kind"] = kinds_of_pairs(rows.person[pairs], rows, counts)[number]
     samples.attrs |= {"area": str(area), "area_reason": area.reason}
     stages = [
-        ("encounters: ticks that open a window", len(rows), len(first), missed),
-        ("encounters: windows", len(first), len(chosen), rejected),
+        funnels.stage(
+            "encounters: ticks that open a window", len(rows), len(first), missed
+        ),
+        funnels.stage("encounters: windows", len(first), len(chosen), rejected),
     ]
-    funnel = [*funnels.get(tracks), *(funnels.stage(*each) for each in stages)]
-    return of_kind(funnels.attach(samples, funnel), kinds)
+    funnels.attach(samples, [*funnels.get(tracks), *stages])
+    return of_kind(samples, kinds)
 
 
 def find_place(

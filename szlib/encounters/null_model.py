@@ -16,7 +16,7 @@ of the circle has two pieces of track from there on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,7 +30,7 @@ from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, compute_velocities
 from .finding import find_encounters, find_place
 from .kinds import find_units, name_kinds, of_kind
-from .occupants import TrackRows
+from .occupants import TrackRows, firsts
 from .pairs import CLOSE, COMPARED, SECTORS, Crowd
 from .sensor import SensorCheck
 from .settings import EncounterSettings
@@ -87,8 +87,7 @@ def _find_leaders(rows: TrackRows) -> tuple[np.ndarray, np.ndarray]:
     """Of each person: the first person of the unit, and the length of the day [s]."""
     unit = find_units(rows, np.flatnonzero(rows.tick % TICKS_PER_SECOND == 0))
     leader = np.unique(unit, return_index=True)[1][unit]
-    begins = np.flatnonzero(np.diff(rows.person, prepend=-1))
-    return leader, rows.recorded[1][rows.day[begins]]
+    return leader, rows.recorded[1][rows.day[firsts(rows.person)]]
 
 
 def _draw(
@@ -159,13 +158,12 @@ class NullEncounters:
     parameters: dict[str, Any] = field(default_factory=dict)
     sensor: SensorCheck | None = None
 
-    def of_kind(self, kinds: str | Iterable[str] | None) -> NullEncounters:
+    def of_kind(self, kinds: str | Collection[str] | None) -> NullEncounters:
         """The encounters of some `kinds`, as `szlib.of_kind`: treat data and null model alike."""
-        names = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
         return replace(
             self,
-            samples=of_kind(self.samples, names),
-            encounters=of_kind(self.encounters, names),
+            samples=of_kind(self.samples, kinds),
+            encounters=of_kind(self.encounters, kinds),
         )
 
 
@@ -177,7 +175,7 @@ def null_encounters(
     minutes: tuple[float, float] = MINUTES,
     r_max: float = CLOSE,
     settings: EncounterSettings | None = None,
-    kinds: str | Iterable[str] | None = None,
+    kinds: str | Collection[str] | None = None,
     progress: bool = True,
     **parameters: Any,
 ) -> NullEncounters:

@@ -36,10 +36,15 @@ def find_neighbours(
     cuts = np.searchsorted(moment[order], moment[order][::_AT_ONCE])
     for rows in np.split(order, np.unique(cuts)[1:]):
         # Two moments are farther apart than the reach, along a third axis.
-        since = 2 * reach * (moment[rows] - moment[rows].min(initial=0))
+        since = 10 * reach * (moment[rows] - moment[rows].min(initial=0))
         points = np.column_stack([place[rows].real, place[rows].imag, since])
         tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
         yield rows[tree.query_pairs(reach, output_type="ndarray").T]
+
+
+def firsts(numbers: np.ndarray) -> np.ndarray:
+    """Positions at which sorted `numbers`, at least 0, change: the first one of each."""
+    return np.flatnonzero(np.diff(numbers, prepend=-1))
 
 
 _ROUNDING = 1e-3  # larger than every rounding error of a position [m]
@@ -80,7 +85,7 @@ class TrackRows:
     def recorded(self) -> tuple[np.ndarray, np.ndarray]:
         """First second of each day, and the seconds of a circle that holds its recording."""
         second = self.tick // TICKS_PER_SECOND
-        begins = np.flatnonzero(np.diff(self.day, prepend=-1))
+        begins = firsts(self.day)
         first = np.minimum.reduceat(second, begins)
         return first, np.maximum.reduceat(second, begins) - first + 2
 

@@ -42,7 +42,7 @@ from .kinds import (
     name_kinds,
     of_kind,
 )
-from .occupants import TrackRows, find_neighbours
+from .occupants import TrackRows, find_neighbours, firsts
 from .samples import sample_rows
 from .sensor import (
     BEFORE,
@@ -177,7 +177,9 @@ class Crowd:
             raise DataError(
                 f"nobody was seen in the area {area}; check its coordinates"
             )
-        rows = replace(rows, day=np.unique(rows.day, return_inverse=True)[1])
+        gaps = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
+        day = np.unique(rows.day, return_inverse=True)[1]
+        rows = replace(rows, day=day, piece=np.r_[0, np.cumsum(gaps)])
         near = rows.within(area.grown(_BEYOND))
         coarse = np.flatnonzero(near & (rows.tick % TICKS_PER_SECOND == 0))
         return cls(rows, rows.within(area), coarse)
@@ -234,16 +236,16 @@ class Crowd:
         found = find_neighbours(rows.place, moment, r_max + _MARGIN)
         # Rows are in the order of people.
         near = np.sort(self.coarse[np.concatenate(list(found), axis=1)], axis=0)
+        near = near[:, np.diff(group[self.rows.person[near]], axis=0)[0] != 0]
         one, other = self.rows.person[near]
         key = one * np.int64(len(group)) + other
-        order = np.lexsort((near[0], key))
-        order = order[(group[one] != group[other])[order]]
+        order = np.argsort(key * len(self.rows) + near[0])
         near = near[:, order]
         of_pair = np.cumsum(np.diff(key[order], prepend=-1) > 0) - 1
         pairs, nearest, at = self._approach(near, of_pair)
         third, kept = self._third_people(near, at, r_max), nearest < r_max
-        near, of_pair = near[:, kept[of_pair]], of_pair[kept[of_pair]]
-        of_pair = np.cumsum(np.diff(of_pair, prepend=-1) > 0) - 1
+        is_kept = kept[of_pair]
+        near, of_pair = near[:, is_kept], (np.cumsum(kept) - 1)[of_pair[is_kept]]
         kind = self._kinds(near, of_pair)
         return Meetings(pairs[:, kept], nearest[kept], kind, third[kept], near, of_pair)
 
@@ -267,7 +269,7 @@ class Crowd:
         wanted = np.isin(met.of_pair, pairs)
         (one, other), known = self._along(met.near[:, wanted], _AROUND)
         near = known & (self.rows.distance(one, other) < r_max)
-        pair = np.broadcast_to(met.of_pair[wanted, None], near.shape)[near]
+        pair = met.of_pair[wanted][np.nonzero(near)[0]]
         found = pd.DataFrame({"pair": pair, "one": one[near], "other": other[near]})
         return found.drop_duplicates().sort_values(["pair", "one"])
 
@@ -278,11 +280,10 @@ class Crowd:
 
         Their shapes are (2, n, len(steps)) and (n, len(steps)).
         """
-        start = pairs[..., None]
-        at = np.clip(start + steps, 0, len(self.rows) - 1)
-        piece, tick = self.rows.piece, self.rows.tick
-        known = (piece[at] == piece[start]) & (tick[at] - tick[start] == steps)
-        return at, (known & self.inside[at]).all(axis=0)
+        start, piece = pairs[..., None], self.rows.piece
+        at = np.clip(start + steps, 0, len(piece) - 1)
+        known = self.inside[at] & (piece[at] == piece[start]) & (at - start == steps)
+        return at, known.all(axis=0)
 
     def _approach(
         self, near: np.ndarray, of_pair: np.ndarray
@@ -294,16 +295,17 @@ class Crowd:
         time = np.clip(time, -0.5, 0.5)
         likely = np.abs(apart + time * relative)
         likely += np.where(self.inside[near].all(axis=0), 0.0, 2 * REACH)
-        at = np.lexsort((likely, of_pair))[np.diff(of_pair, prepend=-1) > 0]
+        least = np.minimum.reduceat(likely, firsts(of_pair))
+        at = np.flatnonzero(likely == least[of_pair])
+        at = at[firsts(of_pair[at])]
         around, known = self._along(near[:, at], _AROUND)
-        distance = rows.distance(*around)
-        distance = np.where(known, distance, np.inf)
+        distance = np.where(known, rows.distance(*around), np.inf)
         best = np.arange(len(at)), distance.argmin(axis=1)
         return around[:, *best], distance[best], at
 
     def _kinds(self, near: np.ndarray, of_pair: np.ndarray) -> np.ndarray:
         """Number of the kind of each pair, from its rows at whole seconds."""
-        pairs = self.rows.person[near[:, np.diff(of_pair, prepend=-1) > 0]]
+        pairs = self.rows.person[near[:, firsts(of_pair)]]
         codes = classify_motion(self.rows, near, of_pair, pairs.shape[1])
         (unit, own), (stream, other) = self.unit[pairs], self.stream[pairs]
         rules = [unit == own, (stream == other) & (codes != _STANDING)]

@@ -125,7 +125,7 @@ def count_ends(
     inside : whether each of them is in the area.
     pairs : rows of two strangers at one moment who are near each other, shape (2, n).
     """
-    breaks = (np.diff(rows.piece) != 0) | (np.diff(rows.tick) != 1)
+    breaks = np.diff(rows.piece) != 0
     recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
     is_end = (np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded
     nearest, distance = np.full(len(rows), np.inf), rows.distance(*pairs)
