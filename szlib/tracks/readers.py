@@ -47,6 +47,9 @@ from .sources import is_table, open_table, require_memory, unpacked
 MISSING, NO_ID = "missing or not a number", "id not a whole number"
 MAX_REJECTED = 0.05
 """Share of the rows of a file that may be unusable, unless a `Recipe` gives another (assumed)."""
+_SCANNED = (
+    2  # bytes of memory for each of a text that is scanned (measured: 1.3 to 1.9)
+)
 MOST_DOUBLED = 0.2
 """Share of rows up to which a person may have a second place at one time (assumed)."""
 # A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
@@ -241,7 +244,7 @@ def _read_file(source: Any, path: Path, recipe: Recipe) -> LoadedFile:
         with unpacked(path) as plain:
             if streamed := scan_streamed(plain, path, recipe):
                 found, scan = streamed
-                require_memory(plain.stat().st_size, f"{path}")
+                require_memory(plain.stat().st_size, f"{path}", _SCANNED)
                 return _accept(Rows(scan.collect(), found), path, recipe)
             rows = load_rows(*open_source(plain, path, recipe), path)
             return _accept(rows, path, recipe)

@@ -178,9 +178,12 @@ def read_head(plain: Path) -> bytes:
     return head.removeprefix(codecs.BOM_UTF8)
 
 
-def require_memory(size: float, where: str) -> None:
-    """Raise MemoryLimitError where the text `where` of `size` bytes needs more memory than is allowed."""
-    memory.require(_BYTES * size, f"{where}: to read {size / 1e6:,.3g} MB of text")
+def require_memory(size: float, where: str, factor: float = _BYTES) -> None:
+    """Raise MemoryLimitError where the text `where` of `size` bytes needs more memory than is allowed.
+
+    It needs `factor` bytes for each of its own.
+    """
+    memory.require(factor * size, f"{where}: to read {size / 1e6:,.3g} MB of text")
 
 
 def read_text(plain: Path, where: str) -> str:
