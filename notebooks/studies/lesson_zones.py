@@ -23,7 +23,10 @@ def choose_zone(record: NotebookRecord) -> szlib.Ellipse:
 @cache
 def choose_paper_zone(record: NotebookRecord) -> szlib.Ellipse:
     """The zone by the paper's method, for the paper's chain."""
-    return fit_to_scenes(record, record.cache.paper_ellipse(), "The paper's zone of this data")
+    speed, r_max = record.cache.method.zone_speed, record.cache.method.r_max
+    options = {"method": "paper", "r_max": r_max, "speeds": [speed], "n_resamples": 0}
+    zone = szlib.SocialZone.fit(record.cache.encounters(), **options)
+    return fit_to_scenes(record, zone.ellipse(speed), "The paper's zone of this data")
 
 
 def fit_to_scenes(record: NotebookRecord, zone: szlib.Ellipse, name: str) -> szlib.Ellipse:

@@ -234,20 +234,17 @@ def _inspect(options: argparse.Namespace) -> int:
     with warnings.catch_warnings(
         action="ignore", category=DataWarning
     ):  # the table shows the same counts
-        samples = read_for_encounters(files, settings, reading)
-        if len(samples):
-            tracks, area = find_place(samples, settings)
-            samples = find_encounters(tracks, settings=replace(settings, area=area))
-            print(f"area {area}")
-            if area.reason:
-                print(f"area found: {area.reason}")
+        tracks = read_for_encounters(files, settings, reading)
+        tracks, area = find_place(tracks, settings)
+        samples = find_encounters(tracks, settings=replace(settings, area=area))
+    print(f"area {area}")
+    if area.reason:
+        print(f"area found: {area.reason}")
     print(funnels.text(funnels.get(samples)))
-    if "area" in samples.attrs:
-        print(describe_pairs(tracks, area))
+    print(describe_pairs(tracks, area))
     command = f"{os.environ.get(COMMAND_VARIABLE, 'the same command')} --save"
     if options.save is not None:
-        if "area" in samples.attrs:
-            found = replace(found, area=samples.attrs["area"])
+        found = replace(found, area=str(area))
         file = found.save(options.save or files[0].with_name(FILE_NAME))
         print("recipe saved:", printable(file))
         words = ["--recipe", options.save] if options.save else []

@@ -184,9 +184,7 @@ def format_table(zone: SocialZone) -> pd.DataFrame:
     for name in ("a", "b"):
         rows = table[[name, f"{name}_low", f"{name}_high"]].itertuples(index=False)
         shown[f"{name} [m] (95 %)"] = [
-            f"{v:.2f} ({low:.2f} to {high:.2f})"
-            if high == high
-            else f"{v:.2f} (unknown)"
+            f"{v:.2f} ({low:.2f} to {high:.2f})".replace("nan to nan", "unknown")
             for v, low, high in rows
         ]
     return shown.assign(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from studies import committed
+from studies import committed, lesson_zones
 
 import szlib
 from szlib.core.input_files import file_content
@@ -221,7 +221,7 @@ def test_zone_of_the_paper_is_fitted_at_the_speed_of_the_robot(record, monkeypat
     )
     samples = szlib.find_encounters(szlib.read_tracks(path))
     monkeypatch.setattr(DataCache, "encounters", lambda self: samples)
-    found = record.cache.paper_ellipse()
+    found = lesson_zones.choose_paper_zone(record)
     expected = szlib.SocialZone.fit(
         samples, method="paper", speeds=[1.1], n_resamples=0
     )

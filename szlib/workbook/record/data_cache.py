@@ -172,17 +172,6 @@ class DataCache:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
         return self.zone().ellipse(self.method.zone_speed)
 
-    def paper_ellipse(self) -> Ellipse:
-        """The ellipse of the paper's method at `zone_speed` (sec. 2), in the person's frame."""
-        zone = SocialZone.fit(
-            self.encounters(),
-            method="paper",
-            r_max=self.method.r_max,
-            speeds=[self.method.zone_speed],
-            n_resamples=0,
-        )
-        return zone.ellipse(self.method.zone_speed)
-
     def store_zone(self, zone: SocialZone) -> SocialZone:
         """Store the `zone` for later notebooks, and return it with its source."""
         file, source = self._path("zone.json"), self._zone_source()

@@ -112,8 +112,9 @@ class NotebookRecord:
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
         method, area = ZoneMethod.from_variables(variables), variables.get("area", "")
-        seed = variables.get("seed", 0)
-        self.cache = DataCache(self.out, data, area, seed, method, contents)
+        self.cache = DataCache(
+            self.out, data, area, variables.get("seed", 0), method, contents
+        )
         format_outputs()
 
     def check(
@@ -155,7 +156,6 @@ class NotebookRecord:
 
     def figure(self, figure: Figure, name: str) -> None:
         """Save a `figure` in the results as NN_topic-`name`.png (`--figures`: also .svg), and show it."""
-        content = io.BytesIO()
         for kind in filter(None, (os.environ.get(folders.FIGURES_VARIABLE), "png")):
             content = io.BytesIO()
             figure.savefig(content, format=kind, dpi=150, bbox_inches="tight")
