@@ -218,6 +218,7 @@ def null_encounters(
     visitors = rows.select(np.isin(rows.person, rows.person[rows.within(area)]))
 
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Samples and encounters of a `shift`."""
         drawn = _draw(seconds, minutes, np.random.default_rng((seed, shift)))
         moved = _move(tracks, visitors, drawn[leader], rows.recorded)
         samples = find_encounters(moved, settings=settings)
@@ -276,6 +277,7 @@ def null_pairs(
     seconds = np.repeat(crowd.rows.recorded[1], SECTORS)
 
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Samples and pairs of a `shift`."""
         met = crowd.meet(r_max, _draw(seconds, minutes, rng))
         counted = stored = met.compared
         if len(counted) > (quota := -(-_STORED // shifts)):

@@ -145,7 +145,7 @@ class PairPaths:
         )
 
     def distances_and_slopes(self, p: Array) -> tuple[Array, Array]:
-        """h (k,) [m] as from `distances`, and its derivatives by the first eight parameters, (k, 8)."""
+        """h (k,) [m] as from `distances`, and its derivatives by the first eight of `p`, (k, 8)."""
         at = np.flatnonzero(self._is_nearest(p))
         # the first of equal ones
         at = at[np.flatnonzero(np.diff(self.encounter[at], prepend=-1))]

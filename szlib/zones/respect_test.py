@@ -97,6 +97,7 @@ def collect_approaches(
     check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
 
     def find_nearest(table: pd.DataFrame) -> pd.DataFrame:
+        """The nearest approach of each encounter."""
         if smooth:
             table = table.assign(distance=smooth_paths(table)[1])
         return nearest_approaches(table).rename(columns={"distance": "nearest"})

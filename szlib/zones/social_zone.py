@@ -135,6 +135,7 @@ class SocialZone:
 
     def __repr__(self) -> str:
         def listed(speeds: Iterable[float]) -> str:
+            """The `speeds` as a text."""
             return ", ".join(f"{speed:g}" for speed in speeds) or "none"
 
         table = self.table()
