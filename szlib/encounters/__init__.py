@@ -1,17 +1,17 @@
 """Encounters: windows in which two people share the attentional space, alone.
 
 geometry         the area and the attentional space
-areas            an area in any form, or found from walking people: `as_area`, `walked_area`
+areas            an area in any form, or the outline of where people were seen: `as_area`, `walked_area`
 kinds            companions, same direction, opposite, crossing, standing, decided on the common track
 settings         what counts as an encounter: `EncounterSettings`
 occupants        people near each other at one moment, and those inside the attentional space of each row
 finding          the four conditions of the paper: `find_encounters`
 samples          what is measured in a window
-near_rows        the rows of a track table or file that encounters in an area can depend on
+near_rows        the rows of a file that encounters in an area can depend on
 days             from the files of days to their encounters, resumable, on one machine or many: `extract_days`
 pairs            every pair of people, and streams that are moved in time: `find_pairs`
 sensor           people that it loses, its noise, and ids that it exchanges: `SensorCheck`
-null_model       the same people, each moved in time: `time_shifted`, `null_encounters`, `null_pairs`
+null_model       the same people, moved in time as units or streams: `time_shifted`, `null_encounters`, `null_pairs`
 """
 
 from .areas import as_area, walked_area

@@ -65,9 +65,8 @@ _OFFSETS = np.radians(np.arange(0, 45, 5))  # of the borders of the sectors
 _MARGIN = 1.75  # way that two people close in half a second, at 3.5 m/s [m]
 # Steps of the clock around each whole second at which two people are measured.
 _AROUND = np.arange(-TICKS_PER_SECOND, TICKS_PER_SECOND + 1)
-_BEYOND = (
-    1.6  # people this far outside of the area may be in it at the next whole second [m]
-)
+# People this far outside of the area may be in it at the next whole second [m].
+_BEYOND = 1.6
 
 
 def find_pairs(

@@ -231,9 +231,8 @@ def _inspect(options: argparse.Namespace) -> int:
     settings = EncounterSettings(area=options.area, has_walls=options.walls)
     description, found = describe_file(files[0], reading)
     print(description)
-    with warnings.catch_warnings(
-        action="ignore", category=DataWarning
-    ):  # the table shows the same counts
+    # The funnel shows the same counts.
+    with warnings.catch_warnings(action="ignore", category=DataWarning):
         tracks = read_for_encounters(files, settings, reading)
         tracks, area = find_place(tracks, settings)
         samples = find_encounters(tracks, settings=replace(settings, area=area))
