@@ -11,7 +11,7 @@ near_rows        the rows of a file that encounters in an area can depend on
 days             from the files of days to their encounters, resumable, on one machine or many: `extract_days`
 pairs            every pair of people, and streams that are moved in time: `find_pairs`
 sensor           people that it loses, its noise, and ids that it exchanges: `SensorCheck`
-null_model       the same people, moved in time as units or streams: `time_shifted`, `null_encounters`, `null_pairs`
+null_model       people moved in time, as units or streams: `time_shifted`, `null_encounters`, `null_pairs`
 """
 
 from .areas import as_area, walked_area
