@@ -46,29 +46,23 @@ from numpy.typing import NDArray
 
 from ..core.checks import Array
 from .obstacles import Priority, find_bodies
-from .problem import (
-    HARD_PRICE,
-    LinearProblem,
-    Question,
-    limit_speed,
-)
+from .problem import LinearProblem, Question, limit_speed
 from .settings import TOLERANCE, MPCSettings
 
 # The iterations end if the change of the inputs is smaller, as a vector [m/s2].
 CONVERGED = 1e-3
+# Price of a metre of decay without `decay_price`, in the unit of the scaled cost: above every multiplier.
+HARD_PRICE = 1e5
 # Rows with a larger value are left out of an iteration [m]; smaller where the plan cannot change so much.
 NEAR = 1.0
-_ROWS = 16  # programs are built for multiples of so many rows
 _FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
 # Largest multiplier of the speed limit. Rows that contradict each other give huge ones, which would spoil
 # the next steps.
 _MOST_CURVED = 1e3
 _MOST_PROBLEMS = 256  # numbers of obstacles for which a planner keeps what it has built
 _EQUAL, _SOFT = 5, 8  # DAQP's kinds of constraints
-_SOLVED, _VIOLATED = (
-    1,
-    2,
-)  # DAQP's answers; the second one if it violates rows with a price
+# DAQP's answers; the second one if it violates rows with a price
+_SOLVED, _VIOLATED = 1, 2
 # No regularisation of convex programs; beside the exact penalty, a negligible quadratic one.
 _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
 
@@ -132,148 +126,108 @@ class TimeBudget:
         return is_late and thread_time() - self._thread > self._limit
 
 
-class _Program:
-    """A quadratic program with room for a number of rows of obstacles of a `LinearProblem`.
+class Program(LinearProblem):
+    """A linear problem that is solved by priorities; for parameters see there.
 
-    Parameters
+    Attributes
     ----------
-    problem : whose rows these are.
-    size : number of rows of obstacles.
-    """
-
-    def __init__(self, problem: LinearProblem, size: int) -> None:
-        n, rows, first = len(problem.gradient), problem.first + size, problem.first
-        self._problem, self._model = problem, daqp.Model()
-        self._model.settings = _DAQP
-        self._lower, self._upper = np.zeros(rows), np.full(rows, 1e30)
-        self._slopes, self._prices = np.zeros((rows - n, n)), np.zeros(rows)
-        # DAQP makes room for the prices of rows that are soft at first
-        self._sense = np.repeat(np.array([0, _SOFT], np.intc), [first, size])
-        start = np.eye(n), np.zeros(n), self._slopes, np.ones(rows), -np.ones(rows)
-        self._model.setup(*start, self._sense)
-        self._sense[3 * n // 2 : first] = _EQUAL
-
-    def solve(
-        self, rows: NDArray[np.intp], lower: Array, prices: Array
-    ) -> tuple[Array, Array, bool] | None:
-        """d, the multipliers of the rows, and whether rows with a price are violated.
-
-        Of the problem's rows it has these, with other lower bounds and prices; without a price a row is hard.
-        None if hard rows contradict each other.
-        """
-        p, first, end = (
-            self._problem,
-            self._problem.first,
-            self._problem.first + len(rows),
-        )
-        k, m = first - len(p.gradient), len(rows)
-        self._slopes[:k], self._slopes[k + m :] = p.slopes[:k], 0.0
-        p.slopes.take(k + rows, axis=0, out=self._slopes[k : k + m], mode="clip")
-        self._lower[:first], self._upper[:first] = p.lower[:first], p.upper[:first]
-        self._lower[first:end], self._lower[end:] = lower, -1e30
-        self._prices[first:end], self._prices[end:] = prices, 0.0
-        self._sense[first:] = _SOFT * (self._prices[first:] > 0)
-        self._model.soft_weights(w_l=self._prices, w_u=self._prices)
-        bounds = self._slopes, self._upper, self._lower, self._sense
-        if self._model.update(p.hessian, p.gradient, *bounds) < 0:
-            return None
-        step, _, flag, info = self._model.solve()
-        is_solved = flag in (_SOLVED, _VIOLATED)
-        return (step, info["lam"], flag == _VIOLATED) if is_solved else None
-
-
-class _Prepared:
-    """A linear problem with its programs.
-
-    Parameters
-    ----------
-    settings : of the controller.
-    shapes, has_floors : as of `LinearProblem`.
+    near : below this lower bound a row cannot become active within an iteration.
+    prices : of the violation of rows; 0: none.
     """
 
     def __init__(
         self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
     ) -> None:
-        s, self.problem = settings, LinearProblem(settings, shapes, has_floors)
-        k, times, levels = self.problem.steps, np.array(s.times), self.problem.levels
+        super().__init__(settings, shapes, has_floors)
+        s, k, times = settings, self.steps, np.array(settings.times)
         # inputs change by 2 a_max at most on each axis
         change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
-        self._near = -np.minimum(change, NEAR)[k]
-        if len(k) <= _FEW_ROWS:
-            self._near[:] = -inf
-        self._is_hard = s.decay_price >= HARD_PRICE
-        price = {Priority.DECAY: min(s.decay_price, HARD_PRICE)}
+        self.near, self.prices = (
+            np.full(len(self.lower), -inf),
+            np.zeros(len(self.lower)),
+        )
+        self.near[self.first :] = -np.minimum(change, NEAR)[k]
+        price = dict.fromkeys(Priority, 0.0) | {Priority.DECAY: s.decay_price}
         if s.zone_price < inf:
             price[Priority.ZONE] = s.zone_price
-        lengths = np.array(s.step_lengths)[k]
-        self.prices = np.array([price.get(each, 0.0) for each in levels]) * lengths
-        np.minimum(self.prices, HARD_PRICE, out=self.prices)
-        self._programs = dict[int, _Program]()
-
-    def _solve_rows(
-        self, rows: NDArray[np.intp], lower: Array, prices: Array
-    ) -> tuple[Array, Array, bool] | None:
-        size = -(-len(rows) // _ROWS) * _ROWS
-        if size not in self._programs:
-            self._programs[size] = _Program(self.problem, size)
-        return self._programs[size].solve(rows, lower[rows], prices[rows])
+        each = np.array([*price.values()]).clip(max=HARD_PRICE)[self.levels]
+        each *= np.array(s.step_lengths)[k]
+        self.prices[self.first :] = each.clip(max=HARD_PRICE)
+        self._is_hard = s.decay_price >= HARD_PRICE
+        self._hard = np.zeros(len(self.lower), np.intc)
+        self._hard[3 * s.N : self.first] = _EQUAL
 
     def solve(self) -> tuple[Array, bool] | None:
         """The change of least cost by the priorities, True if it is relaxed; sets the multipliers of speed.
 
         None if nothing satisfies the rows that are always there.
         """
-        p = self.problem
-        lower = p.lower[p.first :]
-        rows = np.flatnonzero(lower > self._near)
-        found = self._solve_rows(rows, lower, self.prices)
+        rows: Any = slice(None)
+        if len(self.levels) > _FEW_ROWS:
+            rows = np.flatnonzero(self.lower > self.near)
+        found = self._solve_rows(rows, self.lower, self.prices)
         is_relaxed = found is None or (found[2] and self._is_hard)
         if found is None:
-            found = self._solve_levels(rows, lower.copy())
+            found = self._solve_levels(np.arange(len(self.lower))[rows])
         if found is None:
             return None
-        on_speed = p.multipliers
-        np.negative(found[1][p.inputs.size :][: len(on_speed)], out=on_speed)
-        np.clip(on_speed, 0.0, _MOST_CURVED, out=on_speed)
+        of_speed = found[1][self.inputs.size :][: len(self.multipliers)]
+        np.clip(-of_speed, 0.0, _MOST_CURVED, out=self.multipliers)
         return found[0], is_relaxed
 
-    def _solve_levels(
-        self, near: NDArray[np.intp], lower: Array
+    def _solve_rows(
+        self, rows: Any, lower: Array, prices: Array
     ) -> tuple[Array, Array, bool] | None:
+        """d, the multipliers of the rows, and whether rows with a price are violated.
+
+        Of the problem it has these rows, with other lower bounds and prices; without a price a row is hard.
+        None if hard rows contradict each other.
+        """
+        weights = prices[rows]
+        sense = np.where(weights > 0, _SOFT, self._hard[rows])
+        slopes = self.slopes[rows][self.inputs.size :]
+        model = daqp.Model()
+        model.settings = _DAQP
+        given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
+        if model.setup(*given, sense)[0] < 0:
+            return None
+        model.soft_weights(w_l=weights, w_u=weights)
+        step, _, flag, info = model.solve()
+        is_solved = flag in (_SOLVED, _VIOLATED)
+        return (step, info["lam"], flag == _VIOLATED) if is_solved else None
+
+    def _solve_levels(self, near: NDArray[np.intp]) -> tuple[Array, Array, bool] | None:
         """Level by level: the least violation, which is fixed for the next levels."""
-        p, found, chosen, prices = self.problem, None, near[:0], self.prices.copy()
-        for level in Priority:
-            rows = near[p.levels[near] == level]
-            if not len(rows):
-                continue
+        found, lower, prices = None, self.lower.copy(), self.prices.copy()
+        chosen, near = np.split(near, [self.first])
+        levels = self.levels[near - self.first]
+        for level in np.unique(levels):
+            rows = near[levels == level]
             prices[rows] = np.where(prices[rows] > 0, prices[rows], HARD_PRICE)
             chosen = np.concatenate([chosen, rows])
             solved = self._solve_rows(chosen, lower, prices)
             if solved is None:
-                return found
-            found, slopes = solved, p.slopes[p.first - len(p.gradient) + rows]
-            lower[rows] -= np.maximum(lower[rows] - slopes @ found[0], 0.0) + 1e-9
+                break
+            found = solved
+            left = lower[rows] - self.slopes[rows] @ found[0]
+            lower[rows] -= np.maximum(left, 0.0) + 1e-9
             prices[rows] = 0.0
         return found
 
     def is_violated(self) -> bool:
         """True if the plan violates a row without a price."""
-        p = self.problem
-        lower = p.lower[p.first :][self._is_hard | (self.prices == 0.0)]
-        return bool((lower > TOLERANCE).any())
+        violated = self.lower[self.first :] > TOLERANCE
+        return bool(violated[self._is_hard | (self.prices[self.first :] == 0)].any())
 
     def sum_violations(self) -> tuple[float, ...]:
         """Sums of the violations of walls, bodies and zones at the plan [m]."""
-        p = self.problem
-        violated = np.maximum(p.lower[p.first :], 0.0)
-        floors = (each for each in Priority if each < Priority.DECAY)
-        sums = (violated[p.levels == each].sum() for each in floors)
-        return tuple(round(float(each), 4) for each in sums)
+        violated = self.lower[self.first :].clip(0.0)
+        sums = np.bincount(self.levels, violated, len(Priority))[: Priority.DECAY]
+        return tuple(sums.round(4).tolist())
 
     def sum_cost(self) -> float:
         """The cost of the plan, with the prices of what it violates."""
-        p = self.problem
-        return float(p.cost[0] + np.maximum(p.lower[p.first :], 0.0) @ self.prices)
+        return float(self.cost[0] + np.maximum(self.lower, 0.0) @ self.prices)
 
 
 class Planner:
@@ -291,7 +245,7 @@ class Planner:
     def __init__(self, settings: MPCSettings) -> None:
         self.settings = settings
         self.budget = TimeBudget(settings.time_limit, settings.deadline)
-        self._prepared = dict[Any, _Prepared]()
+        self._programs = dict[Any, Program]()
         self.reset()
 
     def reset(self) -> None:
@@ -318,56 +272,52 @@ class Planner:
             return plan._replace(is_relaxed=True)
         return plan
 
-    def _prepare(self, question: Question, has_floors: bool) -> _Prepared:
+    def prepare(self, question: Question, has_floors: bool) -> Program:
+        """The program of a `question`."""
         obstacles = question.barriers
         if has_floors:
             bodies = find_bodies(question.zones, self.settings, as_predicted=True)
             obstacles = obstacles.joined(bodies)
         groups = obstacles.groups
         key = has_floors, *((kind, *of.shape) for kind, of, _ in groups)
-        if key not in self._prepared:
-            if len(self._prepared) >= _MOST_PROBLEMS:
-                self._prepared.clear()
-            self._prepared[key] = _Prepared(self.settings, key[1:], has_floors)
+        if key not in self._programs:
+            if len(self._programs) >= _MOST_PROBLEMS:
+                self._programs.clear()
+            self._programs[key] = Program(self.settings, key[1:], has_floors)
             self.budget.extend()
-        prepared = self._prepared[key]
-        prepared.problem.take(groups)
-        given = prepared.problem.given
+        program = self._programs[key]
+        program.take(groups)
+        given = program.given
         given[:4], given[4:6], given[6:] = question[:3]
-        return prepared
+        return program
 
     def _plan(self, question: Question, guess: Array, has_floors: bool) -> Plan:
-        prepared, s = self._prepare(question, has_floors), self.settings
-        problem = prepared.problem
-        is_relaxed = is_failed = is_converged = timed_out = False
-        problem.inputs[:], problem.multipliers[:] = guess, self._on_speed
-        before = np.zeros(problem.inputs.size)
+        program, s = self.prepare(question, has_floors), self.settings
+        is_relaxed = is_converged = timed_out = False
+        program.inputs[:], program.multipliers[:] = guess, self._on_speed
+        before = np.zeros(guess.size)
         for _ in range(s.max_iterations):
-            problem.evaluate()
-            solved = prepared.solve()
+            program.evaluate()
+            solved = program.solve()
             if solved is None:
-                is_failed = True
-                break
+                self._on_speed[:] = 0.0
+                return Plan(program.inputs.copy(), inf, (inf,), True, False)
             step, is_relaxed = solved
             if step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever
             before = step
-            problem.inputs += step.reshape(-1, 2)
+            program.inputs += step.reshape(-1, 2)
             is_converged = float(step @ step) <= CONVERGED**2
-            if is_converged:
+            timed_out = not is_converged and self.budget.is_spent
+            if is_converged or timed_out:
                 break
-            if self.budget.is_spent:
-                timed_out = True
-                break
-        self._on_speed[:] = 0.0 if is_failed else problem.multipliers
-        np.minimum(np.maximum(problem.inputs, -s.a_max), s.a_max, out=problem.inputs)
+        self._on_speed[:] = program.multipliers
+        np.clip(program.inputs, -s.a_max, s.a_max, out=program.inputs)
         if not is_converged:
-            limit_speed(s, question.state[2:], problem.inputs)
-        inputs = problem.inputs.copy()
-        if is_failed:
-            return Plan(inputs, inf, (inf,), True, False)
+            limit_speed(s, question.state[2:], program.inputs)
         if is_relaxed or not is_converged:
-            problem.evaluate()
-            is_relaxed = is_relaxed or prepared.is_violated()
-        violations = prepared.sum_violations() if is_relaxed else ()
-        return Plan(inputs, prepared.sum_cost(), violations, is_relaxed, timed_out)
+            program.evaluate()
+            is_relaxed = is_relaxed or program.is_violated()
+        violations = program.sum_violations() if is_relaxed else ()
+        inputs = program.inputs.copy()
+        return Plan(inputs, program.sum_cost(), violations, is_relaxed, timed_out)

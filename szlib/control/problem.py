@@ -18,9 +18,6 @@ from ..core.checks import Array
 from .obstacles import Group, Obstacle, Obstacles, Priority
 from .settings import MPCSettings
 
-# Price of a metre of decay without `decay_price`, in the unit of the scaled cost: above every multiplier.
-HARD_PRICE = 1e5
-
 
 class Question(NamedTuple):
     """What a plan is made for.
@@ -258,7 +255,8 @@ class LinearProblem:
     """The problem linearised at a plan, in arrays that stay where they are: set `inputs`, then `evaluate`.
 
     The unknown is the change d of the inputs; the rows are the limits of d, the speed limits, rest at the
-    end, and then the conditions on obstacles: lower <= (d, slopes d) <= upper.
+    end, and then the conditions on obstacles: lower <= slopes d <= upper, where the first 2 N slopes, of the
+    limits, are left out: zeros.
 
     Parameters
     ----------
@@ -272,46 +270,40 @@ class LinearProblem:
     lower, upper, slopes : of the rows.
     hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
     first : number of rows before those of obstacles.
-    levels, steps : level of each row of obstacles, and its k.
+    levels, steps : of each row of obstacles, its level and its k.
     """
 
     def __init__(
         self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
     ) -> None:
-        s, n, n_first = (
-            settings,
-            2 * settings.N,
-            settings.N + 2 * (settings.terminal == "rest"),
-        )
-        self.first, levels, steps = n + n_first, list[int](), list[int]()
-        for kind, number, _ in shapes:
-            conditions = list_conditions(s, kind, has_floors)
-            levels += number * [c.level for c in conditions for _ in c.keep]
-            steps += number * [k for c in conditions for k in range(len(c.keep))]
-        self.levels, self.steps = np.array(levels, int), np.array(steps, int)
-        rows = self.first + len(levels)
+        s, n, motion = settings, 2 * settings.N, _linearise_motion(settings)
+        kinds = [kind for kind, number, _ in shapes for _ in range(number)]
+        rows = [
+            (condition.level, k)
+            for kind in kinds
+            for condition in list_conditions(s, kind, has_floors)
+            for k in range(len(condition.keep))
+        ]
+        self.levels, self.steps = np.reshape(rows, (-1, 2)).astype(int).T
+        self.first = motion.numel_out(1)
+        size = self.first + len(rows)
         self.inputs, self.given, self.multipliers = (
             np.zeros((s.N, 2)),
             np.zeros(8),
             np.zeros(s.N),
         )
-        self.lower, self.upper = np.zeros(rows), np.full(rows, 1e30)
-        self.slopes = np.zeros((rows - n, n))
-        self.hessian, self.gradient, self.cost = (
-            np.zeros((n, n)),
-            np.zeros(n),
-            np.zeros(1),
-        )
-        self._numbers, positions = list[Array](), np.zeros((s.N + 1, 2))
+        self.lower, self.upper = np.zeros(size), np.full(size, 1e30)
+        self.slopes, self.hessian = np.zeros((size, n)), np.zeros((n, n))
+        self.gradient, self.cost = np.zeros(n), np.zeros(1)
         arguments = [self.inputs, self.given, self.multipliers]
-        results = [positions, self.lower, self.upper, self.slopes, self.hessian]
+        positions, begin = np.zeros((s.N + 1, 2)), self.first
+        results = [positions, self.lower, self.upper, self.slopes[n:], self.hessian]
         results += [self.gradient, self.cost]
-        self._calls = [_call(_linearise_motion(s), arguments, results)]
-        begin = self.first
+        self._calls, self._numbers = [_call(motion, arguments, results)], list[Array]()
         for kind, number, count in shapes:
             numbers = np.zeros((number, count + 1))
             function = _linearise_kind(s, kind, has_floors, number, count)
-            results = [self.lower[begin:], self.slopes[begin - n :]]
+            results = [self.lower[begin:], self.slopes[begin:]]
             self._calls.append(_call(function, (positions, numbers), results))
             self._numbers.append(numbers)
             begin += function.numel_out(0)
