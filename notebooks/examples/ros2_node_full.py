@@ -141,7 +141,7 @@ class FullSocialDrive(ros2_node.SocialDrive):
         """Publish (v, omega), or zero, and the costmap."""
         step = super().on_timer()
         if step:
-            self.costmap.publish(self.draw_costmap(step.point.scene.people))
+            self.costmap.publish(self.draw_costmap(step.scene.people))
         return step
 
     def publish(self, v, omega):

@@ -84,19 +84,19 @@ def find_admissible_controls(step: szlib.Step) -> AdmissibleControls:
         free = free.intersection(disc)
     polygon, limits = free, []
     kinds = (g.kind for g in step.scene.barriers.groups for _ in g.offsets)
-    for i, (row, kind) in enumerate(zip(step.scene.rows, kinds, strict=True)):
+    for i, kind in enumerate(kinds):
         for condition in list_conditions(s, kind, has_floors=s.decay_price < inf):
             for k, (curve, inward) in enumerate(_find_edges(step, i, condition.keep)):
                 outer = curve[::-1] + 2 * _REACH * s.a_max * inward
                 allowed = shapely.Polygon(np.vstack([curve, outer]))
                 if not allowed.covers(free):
-                    limits.append(BarrierLimit(row, k, curve))
+                    limits.append(BarrierLimit(i, k, curve))
                     polygon = polygon.intersection(allowed)
     return AdmissibleControls(polygon, tuple(limits))
 
 
 def _find_edges(step: szlib.Step, i: int, keep: tuple[float, ...]) -> list[tuple[Array, Array]]:
-    """The edge of each row of the near obstacle `i`, and the direction to its allowed side."""
+    """The edge of each row of the obstacle `i`, and the direction to its allowed side."""
     s, u0, n = step.scene.settings, step.control, len(keep)
     reach = _REACH * s.a_max
     nudges = 1e-3 * s.a_max * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
@@ -118,7 +118,7 @@ def _find_edges(step: szlib.Step, i: int, keep: tuple[float, ...]) -> list[tuple
 
 
 def _find_residuals(step: szlib.Step, i: int, keep: tuple[float, ...], first: Array) -> Array:
-    """Residuals of n rows of the near obstacle `i` for other first controls, (n, m, 2) to (n, m)."""
+    """Residuals of n rows of the obstacle `i` for other first controls, (n, m, 2) to (n, m)."""
     s, n = step.scene.settings, len(keep)
     only = Obstacles.of(step.scene.barriers.items[i : i + 1], s)
     times = np.array(s.times[: n + 1])[:, None]

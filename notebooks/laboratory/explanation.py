@@ -115,7 +115,7 @@ def _describe_limits(step: szlib.Step, active: tuple[BarrierLimit, ...]) -> str:
     gaps = scene.barriers.gaps(
         np.array([x, x + s.dt * vx]), np.array([y, y + s.dt * vy]), np.array([0.0, s.dt])
     )
-    closing = -scene.spread(gaps[:, 1] - gaps[:, 0]) / s.dt
+    closing = (gaps[:, 0] - gaps[:, 1]) / s.dt
     for limit in active:
         row = limit.row
         is_closing = float(closing[row]) >= _SLIGHT

@@ -94,7 +94,7 @@ class Blind(szlib.MPCCBF):
     def step(self, state: Any, goal: Any, people: Any = (), **options: Any) -> szlib.Step:
         step = super().step(state, goal, **options)
         tracked = TrackedPeople(tuple(people))
-        scene = self._make_scene(step.scene.state, step.scene.goal, tracked, step.scene.near)
+        scene = self._make_scene(step.scene.state, step.scene.goal, tracked)
         return replace(step, scene=scene)
 
 

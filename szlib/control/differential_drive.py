@@ -43,11 +43,11 @@ follow with dv/dt = (acceleration of p along e) + L omega^2, so by up to V^2 / L
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
-from typing import Any, cast
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,10 +57,11 @@ from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
 from .obstacles import Obstacle, Obstacles, Path
-from .people import STANDING_SPEED, People, SpeedZone, Tracker
-from .settings import TOLERANCE, MPCSettings
+from .people import STANDING_SPEED, SpeedZone, Tracker
+from .problem import build_horizon
+from .settings import MPCSettings
 from .step import Scene, Step
-from .verification import ROUNDING, Report, measure_way, verify_step
+from .verification import PIECES, Report, Sampled, verify_step
 from .ways import Heading, Point
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
@@ -69,7 +70,6 @@ _TURNS = np.array(sorted(np.linspace(-pi, pi, 33), key=abs))
 # largest turn that is asked for at once, and where a turn ends [rad]
 _TURN, _ALIGNED = (1.0, 0.2)
 _FREE = 0.02  # h that the point needs [m]
-_SHARES = np.linspace(0.0, 1.0, 17)[1:]  # points of an arc at which a step is verified
 
 
 @dataclass(frozen=True)
@@ -152,120 +152,64 @@ class _Wheels:
         return np.array(states), np.reshape(controls, (-1, 2))
 
 
-@dataclass(frozen=True, repr=False)
-class DriveStep:
-    """What a differential drive does next, and how far it can be relied upon.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class DriveStep(Step):
+    """What a differential drive does next, and how far it can be relied upon: a `Step`.
 
-    What else a `Step` has, such as `status` or `way`, is that of `point`, the step of the point ahead of the
-    axle. Its claims `walls_safe` and `passively_safe` are about the disc.
+    The plan, `inputs`, and what is said of its rows are about the point ahead of the axle, the rest is about
+    the disc.
 
     Attributes
     ----------
     control : (v, omega) to hold for the next dt, within their limits, shape (2,) [m/s, rad/s].
-    predicted : (x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s].
     own : state of the robot now, (x, y, theta, v, omega).
-    point : the step of the point ahead of the axle.
     wheels : how they follow the point.
-    settings : of the disc; those of the point have a larger radius.
     """
 
-    control: Array
-    predicted: Array
     own: Array
-    point: Step
     wheels: _Wheels
-    settings: MPCSettings
-
-    def __getattr__(self, name: str) -> Any:
-        """As of the step of the point."""
-        if name == "point" or name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(self.point, name)
+    _units: ClassVar[str] = "({:.3g} m/s, {:.3g} rad/s)"
 
     @cached_property
-    def scene(self) -> Scene:
-        """What the step was asked, for the disc."""
-        s, asked = self.settings, self.point.scene
-        return asked._replace(
-            state=tuple(self.predicted[0].tolist()),
-            settings=s,
-            zones=Obstacles.of(asked.zones.items, s),
-            fixed=Obstacles.of(asked.fixed.items, s),
-            near_fixed=Obstacles.of(asked.near_fixed.items, s),
-        )
+    def predicted(self) -> Array:
+        """(x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s]."""
+        lasts = np.diff(self.asked.settings.times).tolist()
+        states, _ = self.wheels.follow(self.own, self.planned[1:, :2], lasts)
+        return states
 
     @property
-    def h(self) -> Array:
-        """Barriers of the disc now, as of `Step.h` [m]."""
-        return self.scene.spread(self.scene.barriers.h(*self.scene.state[:2]))
-
-    @property
-    def safe(self) -> bool:
-        """As of `Step.safe`, for the disc.
-
-        No person is unknown, the plan of the point satisfies every row without a price, and the disc has h >=
-        0 now and dt later, and overlaps no body and no wall until then, if people keep their velocity.
-        """
-        points, dt = self.predicted[:2, :2], self.settings.dt
+    def path(self) -> Path:
+        """Where the disc goes within this step."""
+        dt = self.scene.settings.dt
         bows = np.full((2, 1), abs(self.control.prod()) * dt**2 / 8)
-        path = Path(points, np.array([0.0, dt]), *bows)
-        h = self.scene.barriers.h(points[:, 0], points[:, 1], path.times)
-        least = min(h.min(initial=inf), self.scene.bound_gap(path))
-        is_clear = bool(least >= -TOLERANCE)
-        return self.point.feasible and not self.point.unknown and is_clear
+        return Path(self.predicted[:2, :2], np.array([0.0, dt]), *bows)
 
     def verify(self) -> Report:
         """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
-        s = self.settings
-        spare = self.point.scene.settings.r_robot - s.r_robot
-        found, faults = verify_step(self.point, self._carry, spare), list[str]()
-        path = np.vstack([self.own[:2], self._drive(self.own, self.control, s.dt)])
-        h, gap, least = measure_way(self.scene, path, s.dt * np.r_[0.0, _SHARES])
-        differs = np.abs(path[-1] - self.predicted[1, :2]).max()
-        if differs > ROUNDING * max(1.0, np.abs(path).max()):
-            faults.append(f"motion of the disc differs by {differs:.2g}")
-        differs = np.abs(h - self.h[self.scene.rows]).max(initial=0.0)
-        if differs > ROUNDING * max(1.0, np.abs(h).max(initial=0.0)):
-            faults.append(f"h of the disc differs by {differs:.2g}")
-        safe = found.feasible and not self.point.unknown and least >= -TOLERANCE
-        if self.safe and not safe:
-            faults.append("the step says that the disc is safe; it is not")
-        faults = [*found.faults, *faults]
-        now = float(h.min(initial=inf))
-        return replace(found, faults=tuple(faults), h=now, gap=gap, safe=safe)
+        return verify_step(self, self._carry)
 
-    def _carry(self, points: Array, times: Array) -> tuple[Array, Array]:
-        """The way of the disc, whose wheels follow the point from one of `points` to the next."""
-        own, lasts, found = self.own, np.diff(times), [self.own[None, :2]]
-        _, commands = self.wheels.follow(own, points[1:], lasts.tolist())
-        for command, last in zip(commands, lasts, strict=True):
-            found.append(self._drive(own, command, last))
-            own = self.wheels.robot.advance(own, command, last)
-        within = times[:-1, None] + lasts[:, None] * _SHARES
-        return np.concatenate(found), np.r_[times[0], within.ravel()]
-
-    @staticmethod
-    def _drive(own: Array, control: Array, dt: float) -> Array:
-        """Points of the arc on which the disc drives from `own` for `dt` [s], shape (n, 2) [m]."""
-        turned = 1j * (control[1] or 1e-9) * dt
-        way = (
-            control[0] * dt * np.exp(1j * own[2]) / turned * np.expm1(turned * _SHARES)
-        )
-        return np.column_stack([own[0] + way.real, own[1] + way.imag])
-
-    def __repr__(self) -> str:
-        (v, omega), safe = self.control.tolist(), "safe" if self.safe else "not safe"
-        h = min(self.h.tolist(), default=inf)
-        return f"DriveStep({self.status}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s, min h={h:.3g} m)"
-
-    def explain(self) -> str:
-        """Explain the step in sentences, after it is verified, as `Step.explain` does for the point."""
-        faults = [f"\n  WRONG: {each}" for each in self.verify().faults]
-        return f"{self!r}{''.join(faults)}\nThe point ahead of the axle: {self.point.explain()}"
+    def _carry(self, way: Sampled) -> tuple[Array, Array]:
+        """The way of the disc, whose wheels follow the point: arcs, of complex numbers."""
+        points, lasts = way.points[::PIECES], np.diff(way.times[::PIECES])
+        _, commands = self.wheels.follow(self.own, points[1:], lasts.tolist())
+        commands[0] = self.control
+        at, theta = np.array([complex(*self.own[:2])]), self.own[2]
+        for (v, omega), dt in zip(commands, lasts, strict=True):
+            turned = 1j * (omega or 1e-9) * dt
+            shares = np.expm1(turned * np.arange(1, PIECES + 1) / PIECES) / turned
+            at = np.append(at, at[-1] + v * dt * np.exp(1j * theta) * shares)
+            theta += omega * dt
+        return np.column_stack([at.real, at.imag]), way.times
 
 
 class DifferentialDrive(MPCCBF):
     """Drives a robot with two wheels to a goal, outside the social zones of people and away from walls.
+
+    The `state` that `step` takes is (x, y, theta) of the axle's middle [m, rad], or (x, y, theta, v, omega)
+    [m, rad, m/s, rad/s]. The plan begins at the planned velocity of the point. If the robot was stopped or
+    pushed, and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega). The
+    `goal` is that of the disc's centre. The step is a `DriveStep`, whose `control` is (v, omega), to be held
+    for the next dt.
 
     Parameters
     ----------
@@ -316,33 +260,33 @@ class DifferentialDrive(MPCCBF):
         ahead: float | None = None,
         tracker: Tracker | None = None,
     ) -> None:
-        s, self.robot = settings or MPCSettings(), Unicycle()
+        self.robot = Unicycle()
         self.omega_max = float(check_array("omega_max", omega_max, ()))
+        self.ahead = inf if ahead is None else float(check_array("ahead", ahead, ()))
+        given = {"walls": walls, "obstacles": obstacles, "tracker": tracker}
+        super().__init__(zone, settings=settings, **given)
+
+    def _plan_with(self, s: MPCSettings) -> MPCSettings:
+        """Settings of the point ahead of the axle."""
         if not 0 < self.omega_max * s.dt < pi:
             raise SolverError(
-                f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {omega_max}"
+                f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {self.omega_max}"
             )
-        turn = 2 * sin(self.omega_max * s.dt / 2) / s.dt
-        self.ahead = s.v_max / turn
-        if ahead is not None:
-            self.ahead = float(check_array("ahead", ahead, ()))
         if not self.ahead > 0:
             raise SolverError(
-                f"ahead must be positive: the axle itself cannot move sideways; got {ahead}"
+                f"ahead must be positive: the axle itself cannot move sideways; got {self.ahead}"
             )
+        turn = 2 * sin(self.omega_max * s.dt / 2) / s.dt
+        if self.ahead == inf:
+            self.ahead = s.v_max / turn
         self.v_max = min(s.v_max, self.ahead * turn)
         way = self.v_max * s.dt
         self.chord_error = way / 2 * tan(asin(way / 2 / self.ahead) / 2)
-        self._spare = s.eps + self.ahead + self.chord_error
-        radius = s.r_robot + self._spare
+        radius = s.r_robot + (s.eps + self.ahead + self.chord_error)
         self.goal_clearance = radius + self.ahead
         self._wheels = _Wheels(self.ahead, self.v_max)
-        grown = replace(
-            s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max
-        )
-        given = {"walls": walls, "obstacles": obstacles, "tracker": tracker}
-        super().__init__(zone, settings=grown, **given)
-        self.settings = s
+        grown = replace(s, r_robot=radius, eps=0.0, v_max=self.v_max)
+        return replace(grown, margin="euclidean")
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
@@ -350,38 +294,6 @@ class DifferentialDrive(MPCCBF):
         self._command, self._turns = list[float](), False
         self._seen: Scene | None = None
         self._planned_velocity = [0.0, 0.0]
-
-    def step(  # type: ignore[override]
-        self,
-        state: ArrayLike,
-        goal: ArrayLike,
-        people: People = (),
-        *,
-        ids: Iterable[Hashable] | None = None,
-        stamps: ArrayLike | None = None,
-        now: float | None = None,
-        route: ArrayLike | None = None,
-        state_age: float = 0.0,
-    ) -> DriveStep:
-        """Decide the (v, omega) to hold for the next `dt`.
-
-        Parameters
-        ----------
-        state : (x, y, theta) of the axle's middle [m, rad], or (x, y, theta, v, omega) [m, rad, m/s, rad/s].
-            The plan begins at the planned velocity of the point. If the robot was stopped or pushed,
-            and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega).
-        goal : (x, y) of the disc's centre [m].
-        people, ids, stamps, now, route, state_age : as of `MPCCBF.step`.
-
-        Raises
-        ------
-        SolverError : as of `MPCCBF.step`.
-        """
-        more: Any = {"ids": ids, "stamps": stamps, "now": now}
-        found: Any = super().step(
-            state, goal, people, route=route, state_age=state_age, **more
-        )
-        return cast(DriveStep, found)
 
     def _locate(
         self, state: ArrayLike, goal: Point, age: float
@@ -398,16 +310,19 @@ class DifferentialDrive(MPCCBF):
         velocity = self._find_velocity(theta, *speeds)
         return [x + c, y + s, *velocity], (gx + to_x, gy + to_y)
 
-    def _finish(self, step: Step) -> DriveStep:
+    def _finish(self, **found: Any) -> DriveStep:
         """The command with which the wheels follow the point."""
-        self._seen, lasts = step.scene, np.diff(self._s.times).tolist()
-        states, controls = self._wheels.follow(self._own, step.predicted[1:, :2], lasts)
-        self._command = controls[0].tolist()
-        self._planned_velocity = step.predicted[1, 2:].tolist()
-        self._clock.hold(controls[0])
-        return DriveStep(
-            controls[0], states, self._own, step, self._wheels, self.settings
+        asked = self._seen = found.pop("scene")
+        planned = build_horizon(self._s).states(np.array(asked.state), found["inputs"])
+        _, (control,) = self._wheels.follow(self._own, planned[1:2, :2], [self._s.dt])
+        self._command, self._planned_velocity = (
+            control.tolist(),
+            planned[1, 2:].tolist(),
         )
+        state = self.robot.body(self._own)
+        scene = self._make_scene(state, asked.goal, asked.tracked)
+        found |= {"control": control, "scene": scene, "of_point": asked}
+        return DriveStep(**found, own=self._own, wheels=self._wheels)
 
     def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
         """As of `MPCCBF`, but straight to a goal so close that no wall lies between, as in a turn."""
@@ -455,7 +370,7 @@ class DifferentialDrive(MPCCBF):
             for zone, person in zip(scene.zones.items, scene.people, strict=True)
             if hypot(*person.velocity) < STANDING_SPEED
         )
-        h = Obstacles.of(standing, self._s).joined(scene.near_fixed).h(px, py)
+        h = Obstacles.of(standing, self._s).joined(scene.fixed).h(px, py)
         free = h.min(axis=0, initial=inf) >= _FREE
         turn = remainder(float(headings[1:][free[1:].argmax()]) - theta, 2 * pi)
         self._turns = bool(free[1:].any()) and (

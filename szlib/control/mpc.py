@@ -56,9 +56,8 @@ from ..core.checks import (
 from ..core.errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .controller import Controller, StepClock, find_stopping_path
-from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone
+from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone, find_bodies
 from .people import (
-    STANDING_SPEED,
     People,
     Person,
     SpeedZone,
@@ -148,7 +147,6 @@ class MPCCBF(Controller):
     settings: MPCSettings
     zone: Ellipse
     walls: Array
-    _spare = 0.0  # by which the disc is smaller than that which is planned for [m]
 
     def __init__(
         self,
@@ -159,7 +157,8 @@ class MPCCBF(Controller):
         settings: MPCSettings | None = None,
         tracker: Tracker | None = None,
     ) -> None:
-        self.settings = self._s = settings or MPCSettings()
+        self.settings = settings or MPCSettings()
+        self._s = self._plan_with(self.settings)
         self.zone = _choose_zone(zone, self._s.zone_speed)
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
         self.obstacles = tuple(obstacles)
@@ -170,12 +169,17 @@ class MPCCBF(Controller):
         self._take_walls(walls)
         self.reset()
 
+    def _plan_with(self, s: MPCSettings) -> MPCSettings:
+        """Settings of the plan of a robot with the settings `s`."""
+        return s
+
     def _take_walls(self, walls: Any) -> None:
         self.walls = read_walls(walls)
         items = [Wall(*ends) for ends in self.walls.reshape(-1, 4).tolist()]
         self._solids = find_solids(walls)
         self._items = (*items, *self.obstacles)
         self._fixed = Obstacles.of(self._items, self._s)
+        self._fixed_of_disc = Obstacles.of(self._items, self.settings)
         self._ways = WayFinder(self._fixed, self._s)
         self._near_from, self._near_reach = (0.0, 0.0), 0.0
         self._take_near(self._items)
@@ -184,7 +188,7 @@ class MPCCBF(Controller):
         """Take these as what is fixed near the robot, and those among them that it can always stop before."""
         self._near_fixed = Obstacles.of(items, self._s)
         walls = (each for each in items if each.is_fixed)
-        self._walls_near = Obstacles.of(walls, self._s)
+        self._walls_near = Obstacles.of(walls, self.settings)
         self._room: tuple[Point, float] = (0.0, 0.0), -inf
 
     def set_walls(self, walls: Any) -> None:
@@ -250,7 +254,7 @@ class MPCCBF(Controller):
 
         Parameters
         ----------
-        state : (x, y, vx, vy) [m, m/s].
+        state : (x, y, vx, vy) [m, m/s]; for a `DifferentialDrive` see there.
         goal : (x, y) [m].
         people : everybody to be respected: `Person`s, or an array, shape (n, 4): x, y [m], vx, vy [m/s].
         ids : by which the tracker recognises them, None for a person without an id; default: those of the
@@ -275,7 +279,8 @@ class MPCCBF(Controller):
         age = check_number("state_age", state_age)
         x, towards = self._locate(state, check_point("goal", goal), age)
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
-        scene = self._make_scene(x, towards, tracked, self._find_near(*x))
+        self._find_near(*x)
+        scene = self._make_scene(x, towards, tracked, is_point=True)
         heading = self._choose_heading(scene, route)
         remaining = heading.length if heading.length < inf else dist(x[:2], towards)
         self._planner.budget.begin(began)
@@ -288,7 +293,7 @@ class MPCCBF(Controller):
             self._change = plan.inputs - self._plan
         self._plan = plan.inputs
         walls_safe, passively_safe = outlook.is_safe
-        step = Step(
+        step: Step = self._finish(
             control=plan.inputs[0].copy(),
             inputs=plan.inputs,
             status=status,
@@ -303,8 +308,8 @@ class MPCCBF(Controller):
             stuck=clock.time_without_progress(remaining, towards),
             clock=clock.describe(stamps, self.tracker.memory),
         )
-        found: Step = self._finish(step)
-        return found
+        clock.hold(step.control)
+        return step
 
     def _locate(
         self, state: ArrayLike, goal: Point, age: float
@@ -316,10 +321,9 @@ class MPCCBF(Controller):
             x = at.tolist()
         return list(x), goal
 
-    def _finish(self, step: Step) -> Any:
-        """What the robot does by a `step`."""
-        self._clock.hold(step.control)
-        return step
+    def _finish(self, **found: Any) -> Any:
+        """What the robot does, by what was `found`."""
+        return Step(**found)
 
     def _decide(self, scene: Scene, heading: Heading) -> tuple[Status, Plan]:
         """The plan: of least cost if one satisfies the rows, else the one that violates least by priorities.
@@ -330,7 +334,7 @@ class MPCCBF(Controller):
         compared with the one that is found from full braking.
         """
         s, last = self._s, self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        target, fixed = heading.target, scene.near_fixed
+        target, fixed = heading.target, self._near_fixed
         question = Question(scene.state, target, last, scene.zones, fixed)
         guess = self._plan + self._change
         if s.solver == "ipopt":
@@ -361,7 +365,7 @@ class MPCCBF(Controller):
         s, state, control = self._s, scene.state, plan.inputs[0]
         if self._is_clear(scene, control):
             return Outlook(), False
-        bodies = scene.bodies
+        bodies = find_bodies(scene.zones, self.settings)
         after = self._foresee(bodies, find_stopping_path(state, control, s))
         if after.body < -TOLERANCE:
             later = self._foresee(bodies, self._follow_plan(scene, plan.inputs))
@@ -384,7 +388,8 @@ class MPCCBF(Controller):
         last_vx, last_vy = vx + s.dt * ax, vy + s.dt * ay
         stop, last = max(abs(last_vx), abs(last_vy)) / s.a_max, hypot(last_vx, last_vy)
         reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
-        contact = BODY_RADIUS + s.r_robot + reach
+        reach += s.r_robot - self.settings.r_robot
+        contact = BODY_RADIUS + self.settings.r_robot + reach
         for person in scene.people:
             (px, py), (wx, wy) = person.position, person.velocity
             if hypot(px - x, py - y) < contact + (stop + 2 * s.dt) * hypot(wx, wy):
@@ -412,7 +417,7 @@ class MPCCBF(Controller):
     def _foresee(self, bodies: Obstacles, path: Path) -> Outlook:
         """What follows if the disc goes along a `path`, on which it comes to rest."""
         path = self._carry(path)
-        begin, spare = path.points[0], self._spare
+        begin = path.points[0]
         wall, wall_seen = self._walls_near.bound(path, are_fixed=True)
         of_bodies: Any = bodies.bound(path)
         if np.hypot(*np.ptp(path.points, axis=0)) <= AT_REST * self._s.dt:
@@ -420,39 +425,40 @@ class MPCCBF(Controller):
         elif bodies.size:
             places = bodies.groups[0].numbers[:, :2]
             towards = ((places - begin) @ (path.points - begin).T).max(axis=1)
-            overlaps = bodies.gaps(*begin) + spare < -TOLERANCE
-            parting = np.where(towards > 0, -towards, inf) - spare
+            overlaps = bodies.gaps(*begin) < -TOLERANCE
+            parting = np.where(towards > 0, -towards, inf)
             of_bodies = [np.where(overlaps, parting, each) for each in of_bodies]
         found = wall, of_bodies[0], wall_seen, of_bodies[1]
-        return Outlook(*(float(each.min(initial=inf)) + spare for each in found))
+        return Outlook(*(float(each.min(initial=inf)) for each in found))
 
-    def _find_near(
-        self, x: float, y: float, vx: float, vy: float
-    ) -> tuple[int, ...] | None:
-        """Places of what can matter among everything fixed: see `Scene.near`. Looked for once a metre."""
+    def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
+        """Take what can matter among everything fixed. Looked for once a metre: see `Obstacles.find_near`."""
         s, speed = self._s, max(self._s.v_max, hypot(vx, vy))
         if len(self._items) <= _FEW:
-            return None
+            return
         longest = max(s.step_lengths)
         time = s.times[-1] + 2 * longest * s.dt / (1 - (1 - s.gamma) ** longest)
         time = max(time, 2 * s.dt + speed / s.a_max)  # until it rests
         reach = s.r_robot + s.eps + speed * time
         if reach + dist((x, y), self._near_from) > self._near_reach:
             self._near_from, self._near_reach = (x, y), reach + 1.0
-            self._near = tuple(self._fixed.find_near(x, y, self._near_reach))
-            self._take_near([self._items[i] for i in self._near])
-        return self._near
+            near = self._fixed.find_near(x, y, self._near_reach)
+            self._take_near([self._items[i] for i in near])
 
     def _make_scene(
         self,
-        state: Sequence[float],
+        state: Iterable[float],
         goal: Point,
         tracked: TrackedPeople,
-        near: tuple[int, ...] | None = None,
+        *,
+        is_point: bool = False,
     ) -> Scene:
-        """What the step is asked, with the zone of every person; `near` as of `Scene`."""
-        s, people = self._s, tracked.people
-        zones, found = Obstacles((), s.r_robot), [self.zone_of(each) for each in people]
+        """What the step is asked, with the zone of every person; for the disc, or for the planned point."""
+        s, fixed = self.settings, self._fixed_of_disc
+        if is_point:
+            s, fixed = self._s, self._fixed
+        people, zones = tracked.people, Obstacles((), s.r_robot)
+        found = tuple([self.zone_of(each) for each in people])
         if people:
             placed = [
                 Zone.place(zone, each.position, each.heading or 0.0, each.velocity)
@@ -464,19 +470,7 @@ class MPCCBF(Controller):
                 numbers = np.hstack([numbers, knots])
             offsets = np.full(len(people), s.r_robot + s.eps)
             zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
-        fixed = self._fixed, self._fixed if near is None else self._near_fixed
-        found_zones = tuple(found)
-        return Scene(
-            tuple(state),
-            goal,
-            tracked,
-            found_zones,
-            zones,
-            *fixed,
-            s,
-            self._solids,
-            near,
-        )
+        return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 
     def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
         """Where the plan heads; among unknown people, where full braking ends."""
@@ -495,7 +489,7 @@ class MPCCBF(Controller):
             time = max(abs(vx), abs(vy)) / s.a_max
             return heading._replace(target=(x + vx * time / 2, y + vy * time / 2))
         if scene.people and not heading.ways:
-            zones, fixed = scene.zones.groups[0].numbers.tolist(), scene.near_fixed
+            zones, fixed = scene.zones.groups[0].numbers.tolist(), self._near_fixed
             target = find_target(at, heading.target, zones, fixed, s)
             heading = heading._replace(target=target)
         return heading
@@ -510,22 +504,22 @@ class MPCCBF(Controller):
             zone = as_ellipse(zone, self._s.zone_speed)
         return circle_around(zone) if person.heading is None else zone
 
+    def _ask(
+        self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person]
+    ) -> Scene:
+        x = tuple(check_vector("state", state, 4))
+        return self._make_scene(
+            x, check_point("goal", goal), TrackedPeople(tuple(people))
+        )
+
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h at a `position`: of the zones of `people`, then of everything fixed, shape (obstacles,) [m]."""
-        x, y = point = check_point("position", position)
-        scene = self._make_scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
-        return Obstacles.of(scene.barriers.items, self.settings).h(x, y)
-
-    def _find_h_of_goal(self, goal: ArrayLike, people: Sequence[Person]) -> Array:
-        """The barriers at a `goal`; inf for people who walk, because they leave it free."""
-        h = self.barriers(check_point("goal", goal), people)
-        walk = [hypot(*person.velocity) >= STANDING_SPEED for person in people]
-        h[: len(people)][walk] = inf
-        return h
+        at = check_point("position", position)
+        return self._ask((*at, 0.0, 0.0), at, people).barriers.h(*at)
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
         """True if h < 0 at the `goal`, because of something fixed or of one of `people` who stands."""
-        return bool((self._find_h_of_goal(goal, people) < 0).any())
+        return self._ask(np.zeros(4), goal, people).goal_blocked
 
     def check_start(
         self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()
@@ -538,25 +532,25 @@ class MPCCBF(Controller):
         goal : (x, y) [m], which must be free of everything fixed and of people who stand.
         people : everybody who is present.
         """
-        *at, vx, vy = check_vector("state", state, 4)
-        h, at_goal = self.barriers(at, people), self._find_h_of_goal(goal, people)
-        here, tracked = (*at, vx, vy), TrackedPeople(tuple(people))
-        scene, limit = self._make_scene(here, (0.0, 0.0), tracked), self._s.v_max
-        if (h < 0).any():
-            i = int(h.argmin())
+        scene, limit = self._ask(state, goal, people), self._s.v_max
+        *at, vx, vy = scene.state
+        for h, fault, place, remedy in (
+            (scene.barriers.h(*at), "the run starts in violation:", at, "start"),
+            (
+                scene.h_of_goal,
+                "the goal cannot be reached:",
+                scene.goal,
+                "choose a goal",
+            ),
+        ):
+            if (h < 0).any():
+                i = int(h.argmin())
+                raise SolverError(
+                    f"{fault} h = {h[i]:.3f} m for {scene.name(i)} at {place}; {remedy} where h >= 0"
+                )
+        if hypot(vx, vy) > limit:
             raise SolverError(
-                f"the run starts in violation: h = {h[i]:.3f} m for {scene.name(i)} at {at}; start where "
-                "h >= 0"
-            )
-        if (at_goal < 0).any():
-            i = int(at_goal.argmin())
-            raise SolverError(
-                f"the goal {np.asarray(goal).tolist()} cannot be reached: it lies too close to "
-                f"{scene.name(i)} (h = {at_goal[i]:.3f} m); choose one where h >= 0"
-            )
-        if (speed := hypot(vx, vy)) > limit:
-            raise SolverError(
-                f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s"
+                f"the run starts at {hypot(vx, vy):.3f} m/s; the limit is {limit} m/s"
             )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import dist, hypot, inf
-from typing import Literal, NamedTuple, get_args
+from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 import shapely
@@ -43,11 +43,8 @@ class Scene(NamedTuple):
     person_zones : the zone of each person, in their own frame.
     zones : zones of people in the world.
     fixed : walls, and whatever else the controller was given.
-    near_fixed : what can matter of them to this step.
     settings : parameters of the controller.
     solids : areas that walls enclose, of Shapely; None: there are none.
-    near : places of `near_fixed` in `fixed`; None: all. Of many obstacles those out of reach are left out
-        (`Obstacles.find_near`), and what a step says of them is inf.
     """
 
     state: tuple[float, ...]
@@ -56,10 +53,8 @@ class Scene(NamedTuple):
     person_zones: tuple[Ellipse, ...]
     zones: Obstacles
     fixed: Obstacles
-    near_fixed: Obstacles
     settings: MPCSettings
     solids: object = None
-    near: tuple[int, ...] | None = None
 
     @property
     def people(self) -> tuple[Person, ...]:
@@ -68,8 +63,8 @@ class Scene(NamedTuple):
 
     @property
     def barriers(self) -> Obstacles:
-        """What has barriers and can matter: zones, then what is fixed near by."""
-        return self.zones.joined(self.near_fixed)
+        """What has barriers: zones, then what is fixed."""
+        return self.zones.joined(self.fixed)
 
     @property
     def bodies(self) -> Obstacles:
@@ -77,56 +72,50 @@ class Scene(NamedTuple):
         return find_bodies(self.zones, self.settings)
 
     @property
+    def h_of_goal(self) -> Array:
+        """Barriers at the goal, shape (obstacles,) [m]; inf for people who walk: they leave it free."""
+        h = self.barriers.h(*self.goal)
+        walk = [hypot(*each.velocity) >= STANDING_SPEED for each in self.people]
+        h[: len(walk)][walk] = inf
+        return h
+
+    @property
     def goal_blocked(self) -> bool:
         """True if h < 0 at the goal, because of something fixed or of a person who stands there."""
-        h = self.zones.joined(self.fixed).h(*self.goal)
-        stand = [hypot(*each.velocity) < STANDING_SPEED for each in self.people]
-        return bool((h < 0)[[*stand, *[True] * self.fixed.size]].any())
-
-    @property
-    def is_in_solid(self) -> bool:
-        """True if the robot's centre lies inside of a solid wall."""
-        solids = self.solids
-        return solids is not None and bool(shapely.contains_xy(solids, *self.state[:2]))
-
-    @property
-    def rows(self) -> list[int]:
-        """Places of `barriers` among all obstacles of `Step.h`."""
-        n = len(self.people)
-        near = range(self.fixed.size) if self.near is None else self.near
-        return [*range(n), *(n + i for i in near)]
-
-    def spread(self, rows: Array) -> Array:
-        """Rows of all obstacles from `rows` of those near; inf for the others."""
-        if self.near is None:
-            return rows
-        n = len(self.people) + self.fixed.size
-        spread = np.full((n, *rows.shape[1:]), inf)
-        spread[self.rows] = rows
-        return spread
+        return bool((self.h_of_goal < 0).any())
 
     def name(self, i: int) -> str:
         """Name of the obstacle `i` of `Step.obstacles`, such as "wall 0 (0, 0, 5, 0)"."""
-        number = i - len(self.people)
-        if number < 0:
+        n = len(self.people)
+        if i < n:
             known = self.people[i].id
             return f"person {i}" + ("" if known is None else f" (id {known!r})")
-        items = self.fixed.items
-        kind, own = items[number].kind, items[number].numbers
-        same = sum(each.kind == kind for each in items[:number])
-        return f"{kind} {same} ({', '.join(f'{each:g}' for each in own)})"
+        *before, own = self.fixed.items[: i - n + 1]
+        same = sum(each.kind == own.kind for each in before)
+        return f"{own.kind} {same}{repr(own).removeprefix(own.kind)}"
 
-    def bound_gap(self, path: Path) -> float:
-        """Lower bound of the gaps to bodies and everything fixed, and of h + eps of people, on a `path`.
+    def find_danger(self, path: Path, is_feasible: bool) -> str:
+        """Why a robot is not safe that goes along a `path` for a step; "" if it is.
 
-        -inf inside of a solid wall. h has the allowance eps: it is for what a way cuts off a round zone.
+        h has the allowance eps on the way: it is for what a way cuts off a round zone.
         """
-        if self.is_in_solid:
-            return -inf
-        gaps, _ = self.barriers.bound(path)
+        if self.tracked.unknown:
+            return "the position of a person is unknown, so the robot comes to rest"
+        solids, barriers = self.solids, self.barriers
+        if solids is not None and shapely.contains_xy(solids, *path.points[0]):
+            return "the robot is inside of a solid wall"
+        x, y = path.points.T
+        now, then = barriers.h(x, y, path.times).T
+        if (now < -TOLERANCE).any():
+            return f"the robot is already too close to {self.name(int(now.argmin()))}"
+        if not is_feasible:
+            return "its plan is not feasible"
+        if (then < -TOLERANCE).any():
+            return f"it comes too close to {self.name(int(then.argmin()))}"
+        gaps, _ = barriers.bound(path)
         h, _ = self.zones.bound(path, is_barrier=True)
         least = min(gaps.min(initial=inf), h.min(initial=inf) + self.settings.eps)
-        return float(least)
+        return "" if least >= -TOLERANCE else "its disc overlaps a body or a wall"
 
 
 @dataclass(frozen=True, repr=False)
@@ -150,6 +139,7 @@ class Step:
     solve_time : wall-clock time of the whole step [s].
     timed_out : True if the plan was cut short because time was up (`MPCSettings.time_limit` or `deadline`).
     scene : what the step was asked.
+    of_point : what the plan was asked, if it is that of a point which is not the disc's centre.
     way_length : length of the way to the goal [m]: of the route, else straight; inf if there is none.
     ways : ways to the goal, the one that is taken first; empty where none was looked for (`lookahead`).
     stuck : time for which the robot has come no nearer to its goal, from 5 s on; 0 before, while it
@@ -179,16 +169,35 @@ class Step:
     solve_time: float
     timed_out: bool
     scene: Scene
+    of_point: Scene | None = None
     way_length: float = 0.0
     ways: tuple[Way, ...] = ()
     stuck: float = 0.0
     clock: str = ""
+    _units: ClassVar[str] = "({:.3g}, {:.3g}) m/s2"
+
+    @property
+    def asked(self) -> Scene:
+        """What the plan was asked."""
+        return self.of_point or self.scene
+
+    @cached_property
+    def planned(self) -> Array:
+        """States x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s]."""
+        horizon = build_horizon(self.asked.settings)
+        return horizon.states(np.array(self.asked.state), self.inputs)
 
     @cached_property
     def predicted(self) -> Array:
-        """States x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s]."""
-        horizon = build_horizon(self.scene.settings)
-        return horizon.states(np.array(self.scene.state), self.inputs)
+        """(x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s]."""
+        return self.planned
+
+    @property
+    def path(self) -> Path:
+        """Where the disc goes within this step."""
+        dt = self.scene.settings.dt
+        bow = hypot(*self.control.tolist()) * dt**2 / 8
+        return Path(self.predicted[:2, :2], np.array([0.0, dt]), *np.full((2, 1), bow))
 
     @property
     def way(self) -> str:
@@ -205,34 +214,28 @@ class Step:
         """Barriers in the state itself, shape (obstacles,) [m].
 
         Where one is negative, the robot already is where it should not be, and the plan leads out again.
-        Obstacles out of reach have inf here, in `residual` and in `clearance`: see `Scene`.
         """
-        return self.scene.spread(self.scene.barriers.h(*self.scene.state[:2]))
-
-    @cached_property
-    def _h_of_plan(self) -> Array:
-        """h of each near obstacle at each state of the plan."""
-        x, y, *_ = self.predicted.T
-        return self.scene.barriers.h(x, y, np.array(self.scene.settings.times))
+        return self.scene.barriers.h(*self.scene.state[:2])
 
     @property
     def residual(self) -> Array:
-        """h_{k+1} - (1-gamma)^m h_k for each step of m dt, shape (obstacles, N_h) [m]."""
-        s, h = self.scene.settings, self._h_of_plan
+        """h_{k+1} - (1-gamma)^m h_k for each step of m dt of the plan, shape (obstacles, N_h) [m]."""
+        s, (x, y, *_) = (
+            self.asked.settings,
+            self.planned[: self.asked.settings.N_h + 1].T,
+        )
+        h = self.asked.barriers.h(x, y, np.array(s.times[: s.N_h + 1]))
         keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h], float)
-        return self.scene.spread(h[:, 1 : s.N_h + 1] - keep * h[:, : s.N_h])
+        return h[:, 1:] - keep * h[:, :-1]
 
     def _find_violations(self, has_floors: bool) -> dict[Priority, float]:
         """Largest violation of the conditions of each `Priority`, with or without floors [m]."""
-        scene, s = self.scene, self.scene.settings
-        x, y, *_ = self.predicted.T
-        bodies = find_bodies(scene.zones, s, as_predicted=True)
-        obstacles = scene.barriers.joined(bodies) if has_floors else scene.barriers
-        h, worst, i = (
-            obstacles.h(x, y, np.array(s.times)),
-            dict.fromkeys(Priority, 0.0),
-            0,
-        )
+        scene, s, (x, y, *_) = self.asked, self.asked.settings, self.planned.T
+        obstacles, worst, i = scene.barriers, dict.fromkeys(Priority, 0.0), 0
+        if has_floors:
+            bodies = find_bodies(scene.zones, s, as_predicted=True)
+            obstacles = obstacles.joined(bodies)
+        h = obstacles.h(x, y, np.array(s.times))
         for kind, _, offsets in obstacles.groups:
             own, i = h[i : i + len(offsets)], i + len(offsets)
             for level, keep in list_conditions(s, kind, has_floors):
@@ -252,7 +255,7 @@ class Step:
 
         Also of rest at the end, if the plan must end there [m/s].
         """
-        s, velocity = self.scene.settings, self.predicted[1:, 2:]
+        s, velocity = self.asked.settings, self.planned[1:, 2:]
         prices = {Priority.ZONE: s.zone_price, Priority.DECAY: s.decay_price}
         worst = self._find_violations(has_floors=s.decay_price < inf)
         found = [worst[each] for each in Priority if prices.get(each, inf) == inf]
@@ -273,7 +276,7 @@ class Step:
         A person slower than `people.STANDING_SPEED` counts as standing. The robot waits beside them; without
         a way it goes to the nearest point that it can reach.
         """
-        return self.scene.goal_blocked or self.way_length == inf
+        return self.asked.goal_blocked or self.way_length == inf
 
     @property
     def rejected(self) -> int:
@@ -294,7 +297,7 @@ class Step:
         """
         x, y, *_ = self.predicted.T
         times = np.array(self.scene.settings.times)
-        return self.scene.spread(self.scene.barriers.gaps(x, y, times))
+        return self.scene.barriers.gaps(x, y, times)
 
     @property
     def safe(self) -> bool:
@@ -309,41 +312,28 @@ class Step:
         return not self._find_danger()
 
     def _find_danger(self) -> str:
-        """Why this step is not safe; "" if it is."""
-        if self.unknown:
-            return "the position of a person is unknown, so the robot comes to rest"
-        if self.scene.is_in_solid:
-            return "the robot is inside of a solid wall"
-        if (self.h < -TOLERANCE).any():
-            return f"the robot is already too close to {self.scene.name(int(np.argmin(self.h)))}"
-        if not self.feasible:
-            return "its plan is not feasible"
-        after = self.scene.spread(self._h_of_plan[:, 1])
-        if (after < -TOLERANCE).any():
-            return f"it comes too close to {self.scene.name(int(np.argmin(after)))}"
-        dt = self.scene.settings.dt
-        bow = hypot(*self.control.tolist()) * dt**2 / 8
-        path = Path(self.predicted[:2, :2], np.array([0.0, dt]), *np.full((2, 1), bow))
-        is_clear = self.scene.bound_gap(path) >= -TOLERANCE
-        return "" if is_clear else "its disc overlaps a body or a wall"
+        return self.scene.find_danger(self.path, self.feasible)
 
     def verify(self) -> Report:
         """Check this step again, by formulas that share no code with the controller."""
         return verify_step(self)
 
     def __repr__(self) -> str:
-        ax, ay = self.control.tolist()
-        safe, h = "safe" if self.safe else "not safe", min(self.h.tolist(), default=inf)
-        return f"Step({self.status}, {safe}, control=({ax:.3g}, {ay:.3g}) m/s2, min h={h:.3g} m)"
+        safe, control = (
+            "safe" if self.safe else "not safe",
+            self._units.format(*self.control),
+        )
+        found = f"{self.status}, {safe}, control={control}, min h={self.h.min(initial=inf):.3g} m"
+        return f"{type(self).__name__}({found})"
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified: what happened, and what would help."""
-        scene, (ax, ay) = self.scene, self.control.tolist()
+        scene, control = self.scene, self._units.format(*self.control)
         report, danger = self.verify(), self._find_danger()
         verdict = f"not safe: {danger}" if danger else "safe"
         lines = [
             f"Step: {_MEANING[self.status]}; {verdict}",
-            f"  control ({ax:.3g}, {ay:.3g}) m/s2 after {1e3 * self.solve_time:.2g} ms",
+            f"  control {control} after {1e3 * self.solve_time:.2g} ms",
         ]
         if len(self.h):
             i = int(np.argmin(self.h))

@@ -22,11 +22,10 @@ from .settings import TOLERANCE
 
 # Two computations of one number may differ by this much, relative to the largest number (at least 1).
 ROUNDING = 1e-7
-_SAMPLES = 17  # times within a step at which gaps are computed
+PIECES = 16  # of a step, at whose ends gaps are computed
+_SAMPLES = PIECES + 1
 # A robot that moves less than this for a step is never faster than 1 mm/s within it: it rests [m/s].
 AT_REST = 2.5e-4
-# points of a way and their times, to those of another way
-Carry = Callable[[Array, Array], tuple[Array, Array]]
 
 
 class Row(NamedTuple):
@@ -73,70 +72,78 @@ class Report:
         return not self.faults
 
 
-def verify_step(step: Any, carry: Carry | None = None, spare: float = 0.0) -> Report:
-    """Check the plan of a `step` (a `Step`), and its claims.
-
-    Parameters
-    ----------
-    step : the step.
-    carry, spare : way of the disc, and by how much it is smaller [m], if the step is that of another point:
-        see `_check_guard`.
-    """
-    scene, s, x = step.scene, step.scene.settings, np.asarray(step.predicted, float)
-    lasts = s.dt * np.array(s.grid or [1] * s.N)
-    ways = _sample(np.array(scene.state), zip(step.inputs, lasts, strict=True))
-    path, times = ways.points[:_SAMPLES], np.r_[0.0, np.cumsum(lasts)]
-    h = _measure(scene, x[:, :2], times, is_barrier=True)
-    residual = h[:, 1:] - (1 - s.gamma) ** (lasts / s.dt) * h[:, :-1]
-    worst = min(_list_rows(scene, x, h, residual), key=lambda row: row.value)
-    slack, least = max(0.0, -worst.value), float(h[:, :2].min(initial=np.inf))
-    _, gap, lowest = measure_way(scene, path, ways.times[:_SAMPLES])
-    feasible = slack <= TOLERANCE
-    safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
-    compared = {
-        "motion": (ways.states, x),
-        "control": (step.control, step.inputs[0]),
-        "h": (h[:, 0], step.h[scene.rows]),
-        "residual": (residual[:, : s.N_h], step.residual[scene.rows]),
-        "slack": (slack, step.slack),
-    }
-    tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
-    errors = {
-        name: np.abs(np.subtract(*each)).max(initial=0.0)
-        for name, each in compared.items()
-    }
-    faults = [
-        f"{name} differs by {error:.2g}"
-        for name, error in errors.items()
-        if not error <= tolerance
-    ]
-    beyond = np.abs(step.inputs).max() - s.a_max
-    if not beyond <= tolerance / s.dt:
-        faults.append(f"an acceleration is {beyond:.2g} m/s2 beyond its bound")
-    undecided = min(abs(slack - TOLERANCE), abs(lowest + TOLERANCE)) <= tolerance
-    # the bound of a step may be loose where somebody or the robot is fast
-    fastest = max([np.hypot(*each.velocity) for each in scene.people], default=0.0)
-    reach = s.dt * fastest + 2 * np.abs(path - path[0]).sum(axis=1).max()
-    undecided |= not step.safe and lowest <= reach
-    if not undecided and (feasible, safe) != (step.feasible, step.safe):
-        faults.append(
-            f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
-        )
-    faults += _check_guard(step, lasts, carry, spare)
-    return Report(tuple(faults), worst, slack, least, gap, feasible, safe)
-
-
-class _Way(NamedTuple):
-    """Points of a way and their times, `_SAMPLES` for each input, and the states between two inputs."""
+class Sampled(NamedTuple):
+    """Points of a way and their times, `PIECES` for each input, and the states between two inputs."""
 
     points: Array
     times: Array
     states: Array
 
 
+# points and times of the way of the disc, from that of the point which is planned for
+Carry = Callable[[Sampled], tuple[Array, Array]]
+
+
+def verify_step(step: Any, carry: Carry | None = None) -> Report:
+    """Check the plan of a `step` (a `Step`), and its claims.
+
+    Parameters
+    ----------
+    step : the step.
+    carry : the way of the disc from that of the point which is planned for; None: it is the same.
+    """
+    scene, s, x = step.scene, step.asked.settings, np.asarray(step.planned, float)
+    lasts = s.dt * np.array(s.grid or [1] * s.N)
+    way = _sample(np.array(step.asked.state), zip(step.inputs, lasts, strict=True))
+    h = _measure(step.asked, x[:, :2], way.times[::PIECES], is_barrier=True)
+    residual = h[:, 1:] - (1 - s.gamma) ** (lasts / s.dt) * h[:, :-1]
+    worst = _find_worst(step.asked, x, h, residual)
+    path, times = carry(way) if carry else (way.points, way.times)
+    within, until = path[:_SAMPLES], times[:_SAMPLES]
+    of_disc = _measure(scene, within, until, is_barrier=True)
+    gap = _measure(scene, within, until).min(initial=np.inf)
+    of_zones = of_disc[: len(scene.people)].min(initial=np.inf) + scene.settings.eps
+    solids = scene.solids
+    if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
+        gap = -np.inf
+    slack, gap = max(0.0, -worst.value), float(min(gap, of_zones))
+    least = float(of_disc[:, [0, -1]].min(initial=np.inf))
+    lowest, feasible = min(least, gap), slack <= TOLERANCE
+    safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
+    compared = {
+        "motion": (way.states, x),
+        "motion of the disc": (path[::PIECES], step.predicted[:, :2]),
+        "h": (of_disc[:, 0], step.h),
+        "residual": (residual[:, : s.N_h], step.residual),
+        "slack": (slack, step.slack),
+    }
+    if not carry:
+        compared["control"] = step.control, step.inputs[0]
+    tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
+    faults = list[str]()
+    for name, each in compared.items():
+        error = np.abs(np.subtract(*each)).max(initial=0.0)
+        if not error <= tolerance:
+            faults.append(f"{name} differs by {error:.2g}")
+    beyond = np.abs(step.inputs).max() - s.a_max
+    if not beyond <= tolerance / s.dt:
+        faults.append(f"an acceleration is {beyond:.2g} m/s2 beyond its bound")
+    undecided = min(abs(slack - TOLERANCE), abs(lowest + TOLERANCE)) <= tolerance
+    # the bound of a step may be loose where somebody or the robot is fast
+    fastest = max([np.hypot(*each.velocity) for each in scene.people], default=0.0)
+    reach = s.dt * fastest + 2 * np.abs(within - path[0]).sum(axis=1).max()
+    undecided |= not step.safe and lowest <= reach
+    if not undecided and (feasible, safe) != (step.feasible, step.safe):
+        faults.append(
+            f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
+        )
+    faults += _check_guard(step, lasts, carry)
+    return Report(tuple(faults), worst, slack, least, gap, feasible, safe)
+
+
 def _sample(
     state: Array, pieces: Iterable[tuple[Array, float]], rests_by: Any = None
-) -> _Way:
+) -> Sampled:
     """The way of a double integrator that holds each input for its time (paper, eq. 8).
 
     Then it brakes as hard as it can, with the settings `rests_by`.
@@ -154,34 +161,30 @@ def _sample(
         points.append(p + t * v + t**2 / 2 * u)
         times.append(times[-1][-1] + t[:, 0])
         states.append(np.r_[points[-1][-1], v + dt * u])
-    return _Way(np.concatenate(points), np.concatenate(times), np.array(states))
+    return Sampled(np.concatenate(points), np.concatenate(times), np.array(states))
 
 
-def _check_guard(
-    step: Any, lasts: Array, carry: Carry | None, spare: float
-) -> Iterator[str]:
+def _check_guard(step: Any, lasts: Array, carry: Carry | None) -> Iterator[str]:
     """What is wrong with `walls_safe` and `passively_safe` of a `step`, by many points of both ways.
 
     Parameters
     ----------
     step : a `Step`, with the times `lasts` of its inputs.
-    carry : the way of the disc from that of the point which is planned for; None: it is the same.
-    spare : by which the disc is smaller than that of the scene [m].
+    carry : as of `verify_step`.
     """
-    scene, s, is_clear = step.scene, step.scene.settings, list[bool]()
+    scene, s, is_clear = step.scene, step.asked.settings, list[bool]()
     is_fixed = np.array([each.is_fixed for each in scene.barriers.items], bool)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
     for n in (1, s.N):
-        inputs = zip([step.control, *step.inputs[1:n]], lasts, strict=False)
-        points, times, _ = _sample(np.array(scene.state), inputs, s)
-        if carry:
-            points, times = carry(points[:: _SAMPLES - 1], times[:: _SAMPLES - 1])
-        gaps = spare + _measure(scene, points, times, as_predicted=False)
+        inputs = zip(step.inputs[:n], lasts, strict=False)
+        way = _sample(np.array(step.asked.state), inputs, s)
+        points, times = carry(way) if carry else (way.points, way.times)
+        gaps = _measure(scene, points, times, as_predicted=False)
         of_bodies = gaps[~is_fixed]
         if n == 1 and step.walls_safe and (gaps[is_fixed] < -TOLERANCE).any():
             yield "the step says that it can stop before every wall; it cannot"
         overlaps = of_bodies[:, 0] < -TOLERANCE
-        ends = points[:: _SAMPLES - 1] - points[0]
+        ends = points[::PIECES] - points[0]
         nearer = ((places - points[0]) @ ends.T > TOLERANCE).any(axis=1)
         is_hit = np.where(overlaps, nearer, (of_bodies < -TOLERANCE).any(axis=1))
         rests = np.hypot(*np.ptp(points, axis=0)) <= AT_REST * s.dt
@@ -190,55 +193,37 @@ def _check_guard(
         yield "the step says that it rests before somebody walks into it; it does not"
 
 
-def measure_way(scene: Any, path: Array, times: Array) -> tuple[Array, float, float]:
-    """Measure the way of a step with the formulas of this module.
-
-    Parameters
-    ----------
-    scene : of the step.
-    path, times : points of the way, shape (n, 2) [m], and when the robot is there, shape (n,) [s].
-
-    Returns h now, shape (obstacles,), the smallest gap, as of `Report.gap`, -inf in a solid wall, and the
-    smallest of it and of h now and at the end [m].
-    """
-    h = _measure(scene, path, times, is_barrier=True)
-    gaps = _measure(scene, path, times).min(initial=np.inf)
-    zones = h[: len(scene.people)].min(initial=np.inf) + scene.settings.eps
-    gap, solids = float(min(gaps, zones)), scene.solids
-    if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
-        gap = -np.inf
-    return h[:, 0], gap, float(h[:, [0, -1]].min(initial=gap))
-
-
-def _list_rows(scene: Any, x: Array, h: Array, residual: Array) -> Iterator[Row]:
-    """Every row without a price, at the states `x` of a plan."""
+def _find_worst(scene: Any, x: Array, h: Array, residual: Array) -> Row:
+    """The row without a price that has the smallest value, at the states `x` of a plan."""
     s, lengths = scene.settings, np.array(scene.settings.grid or [1] * scene.settings.N)
-    has_floors, found = s.decay_price < np.inf, list[tuple[str, str, Array]]()
+    has_floors, found = s.decay_price < np.inf, list[tuple[Array, str, str, int]]()
     stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
-    for i, (row, each) in enumerate(zip(scene.rows, scene.barriers.items, strict=True)):
-        name = scene.name(row)
+    condition = "the condition of {}{} from k = {} to {}"
+    for i, each in enumerate(scene.barriers.items):
         if not each.has_barrier:
-            found.append((each.kind, name, h[i, 1:]))
+            found.append((h[i, 1:], each.kind, "", i))
         elif not has_floors:
-            found.append((each.kind, name, residual[i, : s.N_h]))
+            found.append((residual[i, : s.N_h], each.kind, "", i))
         elif each.is_fixed:
-            found.append((each.kind, name, h[i, 1:] - stop**lengths * h[i, :-1]))
+            found.append((h[i, 1:] - stop**lengths * h[i, :-1], each.kind, "", i))
         elif s.zone_price == np.inf:
-            found.append((each.kind, name, h[i, 1 : s.N_h + 1]))
+            found.append((h[i, 1 : s.N_h + 1], each.kind, "", i))
         if has_floors and isinstance(each, Zone):
             times = s.dt * np.cumsum([0, *lengths])
             places, _ = _find_places(scene.people[i], times, s, True)
             away = np.hypot(*(x[1:, :2] - places[1:]).T)
             gap = away - BODY_RADIUS - s.r_robot - s.body_gap
-            found.append(("body", f"the body of {name}", gap))
-    for kind, name, values in found:
-        for k, value in enumerate(values.tolist()):
-            where = f"the condition of {name} from k = {k} to {k + 1}"
-            yield Row(kind, where, value)
-    for k, value in enumerate((s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)).tolist()):
-        yield Row("speed", f"the speed limit at k = {k + 1}", value)
+            found.append((gap, "body", "the body of ", i))
+    found.append((s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1), "speed", "", -1))
     if s.terminal == "rest":
-        yield Row("end", "rest at the end", -float(np.abs(x[-1, 2:]).max()))
+        found.append((-np.abs(x[-1:, 2:]).max(axis=1), "end", "", -1))
+    values, kind, whose, i = min(found, key=lambda each: float(each[0].min()))
+    k = int(values.argmin())
+    name = condition.format(whose, scene.name(i), k, k + 1) if i >= 0 else kind
+    name = {"speed": f"the speed limit at k = {k + 1}", "end": "rest at the end"}.get(
+        kind, name
+    )
+    return Row(kind, name, float(values[k]))
 
 
 def _measure(
@@ -266,9 +251,8 @@ def _measure(
         elif isinstance(each, Wall):
             measured = _measure_wall(points, each, is_barrier)
         else:
-            measure, places = each.distance if is_barrier else each.gap, points.T
-            own = zip(*places.tolist(), times.tolist(), strict=True)
-            measured = np.array([measure(*place, *each.numbers) for place in own])
+            measure = each.distance if is_barrier else each.gap
+            measured = measure(*points.T, times, *each.numbers)
         margin = each.margin(s) if is_barrier else 0.0
         found.append(measured - s.r_robot - margin)
     return np.reshape(found, (-1, len(points)))

@@ -66,16 +66,16 @@ def test_the_plan_is_that_with_all_walls(
         assert a.inputs == pytest.approx(b.inputs, abs=1e-4)
         assert a.h.shape == b.h.shape == (91,) and a.residual.shape == b.residual.shape
         assert a.clearance.shape == b.clearance.shape
-        known = np.isfinite(a.h)
-        assert 5 < known.sum() < 100 and np.isfinite(b.h).all()
-        assert a.h[known] == pytest.approx(b.h[known])
-        assert (b.residual[~known] > 0).all()
-        assert (b.h[~known] > 1).all() and (b.clearance[~known] > 1).all()
+        found = near._fixed.find_near(*near._near_from, near._near_reach)
+        left_out = ~np.isin(np.arange(91), [0, *(1 + i for i in found)])
+        assert 5 < left_out.sum() < 85 and near._near_fixed.size == 90 - left_out.sum()
+        assert a.h == pytest.approx(b.h)
+        assert (b.residual[left_out] > 0).all()
+        assert (b.h[left_out] > 1).all() and (b.clearance[left_out] > 1).all()
         claims = "safe", "status", "walls_safe", "passively_safe"
         assert [getattr(a, c) for c in claims] == [getattr(b, c) for c in claims]
         assert a.verify().ok, a.verify().faults
         state = advance(state, a.control, 0.1)
-    assert np.isinf(a.residual[~known]).all()
 
 
 def test_no_move_makes_an_obstacle_out_of_reach_matter() -> None:
@@ -110,12 +110,11 @@ def test_a_wall_that_comes_near_is_in_the_problem_in_time() -> None:
 
 def test_a_robot_that_is_too_fast_sees_farther() -> None:
     walls = scattered(300)
-    counts = [
-        np.isfinite(
-            szlib.MPCCBF(ZONE, walls=walls).step((0.0, 0.0, speed, 0.0), (9.0, 0.0)).h
-        ).sum()
-        for speed in (0.0, 1.0, 2.0)
-    ]
+    counts = []
+    for speed in (0.0, 1.0, 2.0):
+        controller = szlib.MPCCBF(ZONE, walls=walls)
+        controller.step((0.0, 0.0, speed, 0.0), (9.0, 0.0))
+        counts.append(controller._near_fixed.size)
     assert counts[0] == counts[1] < counts[2]
 
 

@@ -406,7 +406,7 @@ def test_a_step_names_a_half_plane():
     assert step.scene.name(2).startswith("half-plane 1 (9, 0, -1")
     assert "nearest is half-plane 0 (0, -1, 0, 1)" in step.explain()
     assert step.goal_blocked and "cannot be reached" in step.explain()
-    with pytest.raises(szlib.SolverError, match="too close to half-plane 0"):
+    with pytest.raises(szlib.SolverError, match="m for half-plane 0"):
         controller.check_start((0.0, 0.0, 0.0, 0.0), (0.0, -5.0))
     assert repr(EDGE) == "half-plane (0, -1, 0, 1)"
 

@@ -170,7 +170,7 @@ LIES = {
     "walls": lambda step: forged(
         with_scene(
             step,
-            near_fixed=Obstacles.of([Wall(-6, 1.9, 6, 1.9)], step.scene.settings),
+            fixed=Obstacles.of([Wall(-6, 1.9, 6, 1.9)], step.scene.settings),
         ),
         "h",
         step.h,

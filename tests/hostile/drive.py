@@ -130,8 +130,8 @@ def faults(drive: Any, own: Any, around: Any, step: Any) -> Any:
     if not same(step.h, judge.h(own[:2])):
         yield "h of the disc"
     lever = drive.ahead * np.array([np.cos(end[2]), np.sin(end[2])])
-    if hypot(*step.point.predicted[0, 2:]) <= drive.v_max and step.point.feasible:
-        at, away = end[:2] + lever, step.point.predicted[1, :2]
+    if hypot(*step.planned[0, 2:]) <= drive.v_max and step.feasible:
+        at, away = end[:2] + lever, step.planned[1, :2]
         if np.abs(at - away).max() > 2 * TOLERANCE:
             yield "the point is not where it was planned"
     if step.safe:
@@ -142,7 +142,7 @@ def faults(drive: Any, own: Any, around: Any, step: Any) -> Any:
             judge.gaps(p, t).min(initial=1)
             for p, t in ((own[:2], 0.0), (end[:2], s.dt))
         )
-        if min(h, gap) < -2 * TOLERANCE or step.point.unknown:
+        if min(h, gap) < -2 * TOLERANCE or step.unknown:
             yield "safe"
         times, bow = (
             BETWEEN * s.dt,

@@ -133,11 +133,10 @@ def test_a_decay_with_a_price_limits_the_polygon_as_a_hard_one() -> None:
 
 
 def test_limits_are_rows_of_the_step_among_many_walls() -> None:
-    """Obstacles that were left out are counted: `row` is a place in `Step.obstacles`."""
+    """Obstacles that were left out of the problem are counted: `row` is a place in `Step.obstacles`."""
     far = [[(x, 30.0), (x + 0.5, 30.0)] for x in range(30)]
     walls = np.array([*far, [(-6.0, 1.0), (6.0, 1.0)]])
     step = step_at([0.0, 0.3, 0.0, 0.3], szlib.Person((40.0, 0.0)), walls)
-    assert step.scene.near == (30,)
     (row,) = {each.row for each in find_admissible_controls(step).limits}
     assert step.obstacles[row].numbers == (-6.0, 1.0, 6.0, 1.0)
 
