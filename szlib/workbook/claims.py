@@ -35,9 +35,8 @@ VERDICTS = (
 NOT_RUN = "not run with this data"  # verdict of a sentence whose checks were not made in this run
 MIN_ZONES = 40  # with fewer zones, a share near one half is not decidable (assumed)
 SURE = 0.9  # share from which a claim is supported, and from which its contrary is (assumed)
-DECISIVE = (
-    0.2  # difference of shares from which a factor decides about a claim (assumed)
-)
+# difference of shares from which a factor decides about a claim (assumed)
+DECISIVE = 0.2
 FACTORS = ("condition", "source", "scenario")  # that may decide about a claim
 _FIXED = {"untestable": "untestable here", "open": "not done here"}
 _TESTS = "tests/"  # begins the name of a test, which a run does not execute
@@ -110,7 +109,8 @@ def judge_claims(matrix: pd.DataFrame) -> pd.DataFrame:
     check_columns(matrix, ["claim", *FACTORS, "draws", "held", "is_control"])
     rows = []
     for claim, cells in matrix.groupby("claim", sort=False):
-        counted, controls = cells[~cells["is_control"]], cells[cells["is_control"]]
+        counted = cells[~cells["is_control"]]
+        controls = cells[cells["is_control"]]
         zones = int(counted.groupby("source")["draws"].max().sum())
         share = _find_share(counted)
         low, high = find_interval(share * zones, zones)
@@ -139,7 +139,8 @@ def _find_deciding_factor(cells: pd.DataFrame) -> str:
     for factor in FACTORS:
         levels = cells.groupby(factor, sort=False)[["held", "draws"]].sum()
         shares = levels["held"] / levels["draws"]
-        low, high = shares.min(), shares.max()
+        low = shares.min()
+        high = shares.max()
         worst = f"{100 * low:.0f} % with {shares.idxmin()}"
         best = f"{100 * high:.0f} % with {shares.idxmax()}"
         found.append((high - low, f"{factor}: {worst}, {best}"))

@@ -46,10 +46,8 @@ _UNWRITABLE = (errno.EBADF, errno.EFBIG, errno.EIO, errno.ENOSPC)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that `arguments` name (default: those of the process) and return its exit code."""
-    for stream in (
-        sys.stdout,
-        sys.stderr,
-    ):  # print escapes where the terminal's encoding lacks a letter
+    # print escapes where the terminal's encoding lacks a letter
+    for stream in (sys.stdout, sys.stderr):
         with suppress(*_BROKEN_STREAM, AttributeError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     try:
@@ -114,14 +112,13 @@ def _add_arguments(parser: Any, arguments: dict[str, dict[str, Any]]) -> None:
         parser.add_argument(*names.split(), **options)
 
 
-def _read_options(options: argparse.Namespace, data: str | Sequence[str]) -> Recipe:
+def _read_options(options: argparse.Namespace, data: Sequence[str]) -> Recipe:
     """The recipe of a command: single values, over that of --recipe or of a file beside the data."""
     from ..tracks import datasets
     from ..tracks.recipe import Recipe, find_recipe
 
-    names = [data] if isinstance(data, str) else list(data)
-    is_named = any(name in datasets.NAMES for name in names)
-    files = [] if is_named or any(map(os.path.isdir, names)) else datasets.find(names)
+    is_named = any(name in datasets.NAMES for name in data)
+    files = [] if is_named or any(map(os.path.isdir, data)) else datasets.find(data)
     columns: dict[str, str | int] = {}
     for pair in filter(None, re.split(r",(?=[a-z]+=)", ",".join(options.columns))):
         name, equals, column = pair.partition("=")
@@ -189,14 +186,11 @@ def _run(options: argparse.Namespace) -> int:
     print(format_summary(summary))
     if junit:
         write_junit(summary, junit)
-    if "report" in summary:
-        print(f"report: {printable(os.path.relpath(summary['report']))}")
-    if summary.get("verdict"):
-        print(summary["verdict"])
     outcomes = summary["notebooks"].items()
     refused = {name: o["error"] for name, o in outcomes if o["status"] == "refused"}
     if refused:
-        names, error = ", ".join(refused), next(iter(refused.values()))
+        names = ", ".join(refused)
+        error = next(iter(refused.values()))
         raise SzlibError(f"{names}: could not be run: {error}; finished results stay")
     return 0 if summary["passed"] else 1
 
@@ -227,7 +221,7 @@ def _inspect(options: argparse.Namespace) -> int:
         raise DataError(
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
-    reading = _read_options(options, options.file)
+    reading = _read_options(options, [options.file])
     settings = EncounterSettings(area=options.area, has_walls=options.walls)
     description, found = describe_file(files[0], reading)
     print(description)
@@ -337,9 +331,8 @@ def _stop_on_signals() -> Iterator[None]:
 
 def _describe(error: Exception) -> str:
     """One line about an error that ends the command."""
-    if isinstance(error, MemoryError) or "failed to map segment" in str(
-        error
-    ):  # the latter of a library
+    # a library says that it failed to map a segment
+    if isinstance(error, MemoryError) or "failed to map segment" in str(error):
         return f"this process has no more memory ({error}); raise its limit (ulimit -v), or free memory"
     if isinstance(error, ModuleNotFoundError):
         return f"{error.name} is missing: pip install 'szlib[workbook]'"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,7 +28,6 @@ from .. import (
 from ..core.files import folder_purpose, write_file
 from ..core.input_files import file_content, printable, read_json_object
 from ..encounters import days as several_days
-from ..encounters.finding import find_place
 from ..tracks import datasets
 from ..zones.outliers import R_MAX
 from ..zones.social_zone import FORMAT
@@ -87,7 +85,8 @@ def fit(
         )
     else:
         zone, table = _fit_files(paths, settings, reading, method, kind)
-    figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
+    figure = Figure(figsize=(6, 4.5), layout="constrained")
+    content = io.BytesIO()
     zone.plot(SPEED if SPEED in zone.ellipses else None, ax=figure.subplots())
     figure.savefig(content, format="png", dpi=150)
     zone.save(file)
@@ -135,14 +134,14 @@ def _fit_files(
     kind: Sequence[str] | None,
 ) -> tuple[SocialZone, pd.DataFrame]:
     """Fit a zone to files of tracks: ours to every pair of people, the others to lone encounters."""
-    files = datasets.find(paths)
-    table, place = find_place(read_tracks(files, recipe=reading), settings)
-    settings = replace(settings, area=place)
+    table = read_tracks(datasets.find(paths), recipe=reading)
     if method in (None, "respect"):
         options: Any = {"kinds": kind, "method": method, "progress": True}
         try:
             with _verdict_only():
-                return SocialZone.from_tracks(table, area=place, **options), table
+                return SocialZone.from_tracks(
+                    table, area=settings.area, **options
+                ), table
         except DataError as error:
             raise DataError(
                 f"{error}; the paper's zone of lone encounters may still be found: --method paper"
@@ -160,7 +159,8 @@ def _fit_lone_encounters(
     kind: Sequence[str] | None,
 ) -> SocialZone:
     """Fit a zone to lone encounters, with their null model where there is a track `table`."""
-    samples, null = of_kind(samples, kind), None
+    samples = of_kind(samples, kind)
+    null = None
     if table is not None:
         null = find_null_model(table, settings=settings, kinds=kind, r_max=R_MAX)
     elif method == "respect":

@@ -29,10 +29,8 @@ from ..tracks import datasets
 # The folder of the notebooks: in an installed package, or beside the package in the repository.
 BUNDLED = Path(__file__).resolve().parent / "notebooks"
 NOTEBOOKS = BUNDLED if BUNDLED.is_dir() else BUNDLED.parents[2] / "notebooks"
-OPTIONS = {
-    "data": "--data",
-    "results": "--out",
-}  # parameters that are options of the command line
+# parameters that are options of the command line
+OPTIONS = {"data": "--data", "results": "--out"}
 RESULTS = "../results"  # the default folder of all results, relative to the notebooks
 RESULTS_OF = "results of "  # how the purpose of each folder of results begins
 # the purpose that marks the folder of all results
@@ -54,9 +52,9 @@ def results_root(results: str | Path) -> Path:
     return ((Path() if NOTEBOOKS == BUNDLED else NOTEBOOKS) / results).resolve()
 
 
-def default_results(notebooks: Path | None = None) -> Path:
+def default_results(notebooks: Path) -> Path:
     """The folder of all results of the `notebooks`: beside those of the repository, else `results` here."""
-    in_repository = (notebooks or NOTEBOOKS) == NOTEBOOKS != BUNDLED
+    in_repository = notebooks == NOTEBOOKS != BUNDLED
     return results_root(RESULTS) if in_repository else Path("results").resolve()
 
 

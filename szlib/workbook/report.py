@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,10 @@ from ..simulation import SCENARIOS
 from ..tracks import datasets, funnels
 from . import folders
 from .claims import NOT_RUN
+from .figures.movies import read_scripts
 from .paper_sentences import judge_sentences
 from .record.data_cache import read_stored_zone
-from .record.parameters import METHOD_DEFAULTS
+from .record.parameters import ZoneMethod
 from .summary import STATIC, fill_template
 
 # The kinds of outputs that are shown, the first of them that an output has.
@@ -65,8 +66,7 @@ def write_report(home: Path, summary: Mapping[str, Any]) -> Path:
         extra_template_basedirs=[],  # not the current folder, which is the default
         template_file="report.html.j2",
     )
-    script = (STATIC / "report.js").read_text(encoding="utf-8")
-    html, _ = exporter.from_notebook_node(page, {"script": script})
+    html, _ = exporter.from_notebook_node(page, {"script": read_scripts("report")})
     write_file(home / folders.REPORT, html)
     return home / folders.REPORT
 
@@ -74,25 +74,18 @@ def write_report(home: Path, summary: Mapping[str, Any]) -> Path:
 def _read_notebook(file: Path, names: Sequence[str]) -> nbformat.NotebookNode:
     """The notebook in a `file`, its texts as HTML; links to the notebooks `names` lead into the report."""
     notebook = nbformat.read(file, as_version=4)
-    question = re.search(
-        r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL
-    )
-    text = " ".join(question[1].replace("*", "").split()) if question else ""
+    question = notebook.metadata.get("szlib", {}).get("asks", "")
     for cell in notebook.cells:
         cell.metadata.clear()
         if cell.cell_type == "markdown":
             cell.source = _render_markdown(cell.source, names)
-        for data in _list_data(cell):
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
             if "text/markdown" in data:
                 data["text/markdown"] = _render_markdown(data["text/markdown"], names)
-    notebook.cells[0].metadata["fold"] = {"name": file.stem, "question": text}
+    notebook.cells[0].metadata["fold"] = {"name": file.stem, "question": question}
     notebook.cells[-1].metadata["is_last"] = True
     return notebook
-
-
-def _list_data(cell: Any) -> Iterator[Any]:
-    """The data of each output of a cell, by kind."""
-    return (output.data for output in cell.get("outputs", ()) if "data" in output)
 
 
 class MathRenderer(IPythonRenderer):
@@ -130,7 +123,7 @@ def _render_front_page(
 ) -> Sequence[str]:
     """The pages before and after the executed `notebooks` as HTML, made from the results in `home`."""
     given = summary["parameters"]
-    speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
+    speed = ZoneMethod.from_variables(given).zone_speed
     is_synthetic = summary["data"] == datasets.SYNTHETIC
     outcomes = {
         name: _complete_outcome(name, outcome)
@@ -191,7 +184,7 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
 
     from . import figures
 
-    zone = read_stored_zone(file) if file.exists() else None
+    zone = read_stored_zone(file)
     if zone is None:
         return {}
     table = zone.table()
@@ -199,7 +192,8 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
     shown = table.filter(regex=names).round(2).to_html(index=False, border=0)
     texts: dict[str, Any] = {"meaning": zone.meaning, "table": shown}
     if speed in zone.ellipses:
-        figure, content = Figure(figsize=(4.8, 4.5), layout="constrained"), io.BytesIO()
+        figure = Figure(figsize=(4.8, 4.5), layout="constrained")
+        content = io.BytesIO()
         truth = PlazaSettings().true_zone(speed) if is_synthetic else None
         figures.plot_zone(zone, speed, truth=truth, ax=figure.subplots())
         figure.savefig(content, format="png", dpi=100)

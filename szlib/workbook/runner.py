@@ -28,16 +28,17 @@ from .. import __version__
 from ..core import memory
 from ..core.errors import DataError
 from ..core.files import folder_lock, temporary_folder, write_file
-from ..core.input_files import file_content, read_json_object
+from ..core.input_files import read_json_object
 from ..core.parallel import limit_jobs, safe_path
 from ..tracks import datasets, funnels
 from . import folders
 from .execution import EMPTY_RECORD, execute_notebook
 from .record.data_cache import DataCache, describe_missing_data, read_stored_zone
-from .record.parameters import METHOD_DEFAULTS, check_parameters
+from .record.parameters import ZoneMethod, check_parameters
 
 # The notebooks whose results later ones need (the encounters, the zone), and those that read all records.
-PRODUCERS, SUMMARIES = ("02", "05"), ("28",)
+PRODUCERS = ("02", "05")
+SUMMARIES = ("28",)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
 LONGEST = ("06", "25", "26")
 SUMMARY = "summary.json"  # file of the outcome of a run
@@ -70,11 +71,10 @@ def run(
 
     Returns
     -------
-    The summary: passed; notebooks, for each one its status ("done"; "undecided": it ended early, with too few
-    encounters for a zone; "error": a cell failed; "refused": data, disk or memory do not allow it;
-    "not started": an earlier one was refused), seconds, checks and key figures; the path of the report; the
-    verdict. The same, with notebooks of earlier runs on the same data, parameters and version, is in
-    ``summary.json``.
+    The summary: passed; verdict; path of the report; status, seconds, checks and key figures by notebook.
+    A status is "done"; "undecided": too few encounters for a zone; "error": a cell failed; "refused": data,
+    disk or memory do not allow it; "not started": an earlier one was refused. ``summary.json`` also has the
+    notebooks of earlier runs on the same data, parameters and version.
 
     Raises
     ------
@@ -82,21 +82,17 @@ def run(
     StorageError : the results cannot be written, or another run writes to the same folder.
     """
     place = folders.find_notebooks(notebooks)
-    scripts = choose_notebooks(only, place)
-    early = (s for s in folders.list_notebooks(place) if s.stem[:2] <= PRODUCERS[-1])
+    known = folders.list_notebooks(place)
+    scripts = choose_notebooks(known, only)
+    early = (s for s in known if s.stem[:2] <= PRODUCERS[-1])
     given = check_parameters(parameters or {}, sorted({*scripts, *early}))
     root = folders.default_results(place) if out is None else folders.results_root(out)
     data = folders.absolute_data(data)
     home = folders.claim_results(root, data, given)
     with folder_lock(home), safe_path():
-        files = DataCache(home, data, seed=given.get("seed", 0)).files()
-        contents = [[file.name, *file_content(file)] for file in files]
-        source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
-        source |= {"files": contents, "parameters": given}
+        source = _describe_source(home, data, given)
         names = [script.stem for script in scripts]
-        known = {script.stem for script in folders.list_notebooks(place)}
-        stored = _stored_outcomes(home, source)
-        outcomes = {name: stored[name] for name in stored.keys() & known}
+        outcomes = _stored_outcomes(home, source, known)
         outcomes |= dict.fromkeys(names, NOT_STARTED)
         write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
         folders.remove_outputs(home, names)
@@ -116,6 +112,19 @@ def run(
     return _summarise(source, {name: outcomes[name] for name in names})
 
 
+def _describe_source(
+    home: Path, data: str | Sequence[str], given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What the results of a run depend on: version, data with the content of its files, parameters."""
+    cache = DataCache(home, data, seed=given.get("seed", 0))
+    return {
+        "szlib": __version__,
+        "data": datasets.label(data),
+        "files": cache.source()["files"],
+        "parameters": given,
+    }
+
+
 def _describe_machine() -> dict[str, Any]:
     """When, how and where a run was made, as the report states it."""
     python = f"Python {platform.python_version()}"
@@ -131,28 +140,27 @@ def _describe_data(
     home: Path, source: Mapping[str, Any], outcomes: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Area, warnings and verdict of the data of a run, from the encounters and the zone in `home`."""
-    found, verdict = dict[str, Any](), ""
-    zone, samples = read_stored_zone(home / "zone.json"), home / "encounters.parquet"
+    found: dict[str, Any] = {}
+    zone = read_stored_zone(home / "zone.json")
+    samples = home / "encounters.parquet"
     if zone and zone.provenance.get("source", {}).get("files") == source["files"]:
-        default = METHOD_DEFAULTS["zone_speed"]
-        speed = source["parameters"].get("zone_speed", default)
-        verdict = f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
+        speed = ZoneMethod.from_variables(source["parameters"]).zone_speed
+        found["verdict"] = f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
     if samples.exists():
         table = pd.read_parquet(samples, columns=[])
         found["warnings"] = funnels.warnings(funnels.get(table))
         found["area"] = "{area} {area_reason}".format_map(table.attrs).strip()
         is_undecided = any(o["status"] == "undecided" for o in outcomes.values())
-        if not verdict and is_undecided:
-            verdict = f"undecided: {describe_missing_data(samples)}"
-    return found | ({"verdict": verdict} if verdict else {})
+        if is_undecided and "verdict" not in found:
+            found["verdict"] = f"undecided: {describe_missing_data(samples)}"
+    return found
 
 
-def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Path]:
-    """The scripts of the notebooks in `place` whose numbers or names are in `only`; all if it is empty.
+def choose_notebooks(scripts: Sequence[Path], only: Iterable[str]) -> list[Path]:
+    """The `scripts` of the notebooks whose numbers or names are in `only`; all if it is empty.
 
-    Raises DataError for an unknown name, and if there are no notebooks.
+    Raises DataError for an unknown name.
     """
-    scripts = folders.list_notebooks(place or folders.find_notebooks())
     found = {name: [s for s in scripts if folders.has_name(s, name)] for name in only}
     if unknown := [name for name, each in found.items() if not each]:
         known = ", ".join(script.stem for script in scripts)
@@ -232,12 +240,13 @@ def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
 
 
 def _stored_outcomes(
-    home: Path, source: Mapping[str, Any]
+    home: Path, source: Mapping[str, Any], known: Iterable[Path]
 ) -> dict[str, dict[str, Any]]:
-    """The outcomes of an earlier run of the same `source`: version, data and parameters."""
-    stored, as_stored = read_json_object(home / SUMMARY), json.loads(json.dumps(source))
-    is_same = as_stored.items() <= stored.items()
-    return dict(stored["notebooks"]) if is_same else {}
+    """The outcomes of `known` notebooks in an earlier run of the same version, data and parameters."""
+    stored = read_json_object(home / SUMMARY)
+    as_stored = json.loads(json.dumps(source))
+    outcomes = stored["notebooks"] if as_stored.items() <= stored.items() else {}
+    return {s.stem: outcomes[s.stem] for s in known if s.stem in outcomes}
 
 
 def _store(home: Path, summary: dict[str, Any]) -> dict[str, Any]:

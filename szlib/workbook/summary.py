@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from os.path import relpath
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ STATIC = Path(__file__).parent / "static"  # templates, and what a browser shows
 
 
 def format_summary(summary: Mapping[str, Any]) -> str:
-    """Format the `summary` of a run: a row for each notebook, each result that does not hold, the verdict."""
+    """Format the `summary` of a run: a row for each notebook, what does not hold, the report, the verdict."""
     return fill_template("summary.txt.j2", **summary)
 
 
@@ -35,5 +36,9 @@ def fill_template(name: str, **variables: Any) -> str:
         autoescape=not name.endswith(".txt.j2"),
         undefined=StrictUndefined,
     )
-    pages.filters |= {"printable": printable, "value": format_value}
+    pages.filters |= {
+        "printable": printable,
+        "value": format_value,
+        "relative": relpath,
+    }
     return pages.get_template(name).render(variables)

@@ -14,7 +14,7 @@ from szlib.core.errors import DataError
 from szlib.core.files import write_checksum
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook import execution, runner
+from szlib.workbook import execution, folders, runner
 from szlib.workbook.cli import main
 from szlib.workbook.record.parameters import check_parameters
 
@@ -249,13 +249,14 @@ def test_only_selects_notebooks(notebooks, tmp_path):
 def test_notebooks_are_ordered_and_chosen_by_full_number(notebooks):
     names = ["00_start", "06_barriers", "06b_build", "07_passing", "10_room"]
     notebooks(**{f"_{name}": "" for name in reversed(names)})
+    known = folders.list_notebooks(folders.find_notebooks())
     chosen = [
-        [s.stem for s in runner.choose_notebooks(only)]
+        [s.stem for s in runner.choose_notebooks(known, only)]
         for only in ([], ["06"], ["06b"], ["10_room", "00"])
     ]
     assert chosen == [names, ["06_barriers"], ["06b_build"], ["00_start", "10_room"]]
     with pytest.raises(DataError, match="no notebook 0; there are 00_start"):
-        runner.choose_notebooks(["0"])
+        runner.choose_notebooks(known, ["0"])
 
 
 def test_notebooks_wait_only_for_encounters_and_zone_and_the_summary_for_all(notebooks):
@@ -271,17 +272,15 @@ def test_notebooks_wait_only_for_encounters_and_zone_and_the_summary_for_all(not
         "28_sentences",
     ]
     notebooks(**{f"_{name}": "" for name in names})
-    stems = [
-        [s.stem for s in batch]
-        for batch in runner.split_batches(runner.choose_notebooks([]))
-    ]
+    known = folders.list_notebooks(folders.find_notebooks())
+    stems = [[s.stem for s in batch] for batch in runner.split_batches(known)]
     assert stems == [
         names[:3],
         names[3:5],
         ["06_robot", "06b_build", "17_a"],
         ["28_sentences"],
     ]
-    one = runner.choose_notebooks(["06"])
+    one = runner.choose_notebooks(known, ["06"])
     assert runner.split_batches(one) == [one]
 
 

@@ -71,7 +71,8 @@ def snapshot(
     h : barrier of each obstacle [m].
     status : `Step.status`, or "".
     """
-    present, known = ~np.isnan(people[:, 0]), h[np.isfinite(h)]
+    present = ~np.isnan(people[:, 0])
+    known = h[np.isfinite(h)]
     placed = place_zones(zones, people)
     return {
         "t": round(t, 3),
@@ -127,8 +128,11 @@ class Movie(bytes):
         limits : x0, x1, y0, y1 of the scene [m].
         """
         movie = super().__new__(cls, gif)
-        time, stuck, n = run.time.tolist(), run.stuck.tolist(), len(run.zones)
-        columns = time, run.states, run.people, run.predicted, run.h, run.status, stuck
+        n = len(run.zones)
+        columns = (
+            run.time.tolist(), run.states, run.people, run.predicted, run.h, run.status,
+            run.stuck.tolist(),
+        )  # fmt: skip
         movie.run = {
             "layout": scene_layout(run.scenario, run.settings, limits),
             "snapshots": [

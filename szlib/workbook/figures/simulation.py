@@ -36,9 +36,15 @@ ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 _PADDING = 0.2  # margin around everything that is drawn [m]
 _SAME_PLACE = 0.35  # positions nearer to the last label than this have none [m]
 # the labels of times
-_OF_ROBOT: Any = {"ha": "center", "va": "center", "fontsize": 8, "color": BLACK}
-_OF_ROBOT |= {"xytext": (0, 0), "textcoords": "offset points"}
-_OF_ROBOT["path_effects"] = [Stroke(linewidth=2, foreground="white"), Normal()]
+_OF_ROBOT: Any = {
+    "ha": "center",
+    "va": "center",
+    "fontsize": 8,
+    "color": BLACK,
+    "xytext": (0, 0),
+    "textcoords": "offset points",
+    "path_effects": [Stroke(linewidth=2, foreground="white"), Normal()],
+}
 _OF_PERSON = _OF_ROBOT | {"color": "#7A2E00", "xytext": (0, 8)}  # dark red
 _LEGEND = ("o", BLUE, "robot"), ("-", RED, "zone"), ("^", RED, "person")
 # a wall is drawn to its end if the end is at most this far from all else [m]
@@ -84,7 +90,8 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
         draw_moving(ax, run, row, robot=_ROBOT_COLOURS(depth), zone=ZONE_COLOURS(depth))
         places = np.vstack([run.states[row, :2], run.people[row, :, :2]])
         for i in np.flatnonzero(np.hypot(*(places - labelled).T) > _SAME_PLACE):
-            labelled[i], text = places[i], f"{run.time[row]:.3g}"
+            labelled[i] = places[i]
+            text = f"{run.time[row]:.3g}"
             ax.annotate(text, places[i], **(_OF_PERSON if i else _OF_ROBOT))
     for mark, colour, name in _LEGEND:
         ax.plot([], [], mark, color=colour, label=name)
@@ -112,7 +119,8 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
     step = max(1, round(every / run.settings.dt))
     rows = np.unique(np.r_[np.arange(0, len(run.states), step), len(run.states) - 1])
     figure = Figure(figsize=(width, width * 0.55), layout="constrained", dpi=70)
-    canvas, ax = FigureCanvasAgg(figure), figure.subplots()
+    canvas = FigureCanvasAgg(figure)
+    ax = figure.subplots()
     set_limits(ax, [(run, rows)])
     draw_scenery(ax, run.scenario)
     label_metres(ax, "t")
@@ -194,11 +202,11 @@ def set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
         points += [run.states[:, :2] + radius, run.states[:, :2] - radius]
         for people in run.people[rows]:
             points += [zone.curve(25) for zone in place_zones(run.zones, people)]
-    drawn, ends = np.vstack(points), first.scenario.walls.reshape(-1, 2)
-    is_after, is_before = (
-        ends > drawn.min(axis=0) - _WALL_EXTENT,
-        ends < drawn.max(axis=0) + _WALL_EXTENT,
-    )
+    drawn = np.vstack(points)
+    ends = first.scenario.walls.reshape(-1, 2)
+    is_after = ends > drawn.min(axis=0) - _WALL_EXTENT
+    is_before = ends < drawn.max(axis=0) + _WALL_EXTENT
     drawn = np.vstack([drawn, ends[(is_after & is_before).all(axis=1)]])
-    low, high = drawn.min(axis=0) - _PADDING, drawn.max(axis=0) + _PADDING
+    low = drawn.min(axis=0) - _PADDING
+    high = drawn.max(axis=0) + _PADDING
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))

@@ -16,8 +16,12 @@ from matplotlib.legend import Legend
 from ...control.obstacles import Obstacle, Wall
 from ...core.checks import Array
 
-BLUE, ORANGE, GREEN = "#0072B2", "#E69F00", "#009E73"
-RED, GREY, BLACK = "#D55E00", "#999999", "#000000"
+BLUE = "#0072B2"
+ORANGE = "#E69F00"
+GREEN = "#009E73"
+RED = "#D55E00"
+GREY = "#999999"
+BLACK = "#000000"
 SEQUENCE = "viridis"
 # Points on each side of the grid on which the outline of an obstacle is found.
 _GRID = 201
@@ -135,7 +139,9 @@ def alt_text(figure: Figure) -> str:
     """
     parts = [figure.get_suptitle()]
     for ax in figure.axes:
-        x, y, legend = ax.get_xlabel(), ax.get_ylabel(), ax.get_legend()
+        x = ax.get_xlabel()
+        y = ax.get_ylabel()
+        legend = ax.get_legend()
         axes = f"{y} over {x}" if x and y else x or y
         part = ": ".join(filter(None, (ax.get_title(), axes)))
         names = (

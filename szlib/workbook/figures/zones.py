@@ -93,7 +93,8 @@ def plot_zones(zone: FittedZone, *, ax: Axes | None = None) -> Axes:
     zone : fitted zone.
     ax : axes to draw on; None makes new ones.
     """
-    ax, speeds = get_axes(ax, size=(6, 5)), sorted(zone.ellipses)
+    ax = get_axes(ax, size=(6, 5))
+    speeds = sorted(zone.ellipses)
     for speed, colour in zip(speeds, pick_colours(speeds), strict=True):
         verdict = zone.verdict(speed)
         style: Any = {"color": colour, "label": f"{speed:g} m/s ({verdict})"}

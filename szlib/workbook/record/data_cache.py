@@ -82,6 +82,11 @@ class DataCache:
         """Whether the data is the synthetic plaza, whose true zone is known."""
         return self.data == datasets.SYNTHETIC
 
+    @property
+    def settings(self) -> EncounterSettings:
+        """What counts as an encounter, and the area, if one is given."""
+        return self.method.encounter_settings(self.area or None)
+
     def files(self) -> list[Path]:
         """The files of the data set; the plaza is written first if it is missing or damaged."""
         if not self.is_synthetic:
@@ -99,10 +104,9 @@ class DataCache:
 
     def tracks(self) -> pd.DataFrame:
         """The track table of the data set; recordings that have each their own area stand side by side."""
-        settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
             tracks = read_tracks(files, recipe=self.method.read_options())
-        area = settings.area or tracks.attrs.get("area", AUTO)
+        area = self.settings.area or tracks.attrs.get("area", AUTO)
         return place_apart(tracks) if area == AUTO else tracks
 
     def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
@@ -110,23 +114,17 @@ class DataCache:
 
         `tracks`, the table of the data, saves reading the files again where the area depends on them.
         """
-        settings = self.method.encounter_settings(self.area or None)
+        if tracks is not None:
+            return find_place(tracks, self.settings)[1]
         with self._unchanged_data() as files:
-            if tracks is not None:
-                return find_place(tracks, settings)[1]
-            return days.find_area(files, settings, self.method.read_options())
+            return days.find_area(files, self.settings, self.method.read_options())
 
     def encounters(self) -> pd.DataFrame:
         """The encounters that notebook 02 stored, or the same found now."""
-        if content := load_cached(self._path("encounters.parquet"), self._source()):
+        if content := load_cached(self._path("encounters.parquet"), self.source()):
             return pd.read_parquet(io.BytesIO(content))
-        tracks, settings = self._searched()
-        return self.store_encounters(find_encounters(tracks, settings=settings))
-
-    def _searched(self) -> tuple[pd.DataFrame, EncounterSettings]:
-        """The tracks, and the settings with which encounters are found in them."""
-        tracks = self.tracks()
-        return tracks, self.method.encounter_settings(self.find_area(tracks))
+        samples = find_encounters(self.tracks(), settings=self.settings)
+        return self.store_encounters(samples)
 
     def store_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Store the `samples` of encounters for later notebooks, and return them.
@@ -137,13 +135,14 @@ class DataCache:
         content = io.BytesIO()
         samples.to_parquet(content)
         store_cached(
-            self._path("encounters.parquet"), content.getvalue(), self._source()
+            self._path("encounters.parquet"), content.getvalue(), self.source()
         )
         return samples
 
     def zone(self) -> SocialZone:
         """The zone that notebook 06 stored, or the same fitted now."""
-        file, source = self._path("zone.json"), self._zone_source()
+        file = self._path("zone.json")
+        source = self._zone_source()
         zone = read_stored_zone(file) if load_cached(file, source) else None
         if zone and zone.provenance.get("source") == json.loads(json.dumps(source)):
             return zone
@@ -154,10 +153,11 @@ class DataCache:
 
         Where a recording is too short for a null model, it is the paper's zone, of lone encounters.
         """
-        tracks, settings = self._searched()
         options = self.method.fit_options()
+        tracks = self.tracks()
+        area = self.find_area(tracks)
         try:
-            zone = SocialZone.from_tracks(tracks, area=settings.area, **options)
+            zone = SocialZone.from_tracks(tracks, area=area, **options)
         except DataError as error:
             print(f"The zone is not tested against a null model: {error}")
             zone = SocialZone.fit(self.encounters(), method="paper", **options)
@@ -165,8 +165,8 @@ class DataCache:
 
     def null_model(self) -> NullEncounters | None:
         """The null model of the encounters, as from `find_null_model`."""
-        tracks, settings = self._searched()
-        return find_null_model(tracks, settings=settings, r_max=self.method.r_max)
+        r_max = self.method.r_max
+        return find_null_model(self.tracks(), settings=self.settings, r_max=r_max)
 
     def ellipse(self) -> Ellipse:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
@@ -174,7 +174,8 @@ class DataCache:
 
     def store_zone(self, zone: SocialZone) -> SocialZone:
         """Store the `zone` for later notebooks, and return it with its source."""
-        file, source = self._path("zone.json"), self._zone_source()
+        file = self._path("zone.json")
+        source = self._zone_source()
         zone = replace(zone, provenance={**zone.provenance, "source": source})
         zone.save(file)
         write_checksum(file, file.read_bytes(), source)
@@ -203,7 +204,7 @@ class DataCache:
                 )
             yield files
 
-    def _source(self) -> dict[str, Any]:
+    def source(self) -> dict[str, Any]:
         """What encounters are made from: content of the files, parameters, version of szlib."""
         with self._unchanged_data():
             files = self.contents
@@ -219,7 +220,7 @@ class DataCache:
 
     def _zone_source(self) -> dict[str, Any]:
         """What the zone is made from."""
-        return self._source() | {"fit": self.method.fit_options()}
+        return self.source() | {"fit": self.method.fit_options()}
 
 
 def find_null_model(tracks: pd.DataFrame, **options: Any) -> NullEncounters | None:

@@ -43,7 +43,8 @@ if TYPE_CHECKING:
 
 TABLES = folders.NOTEBOOKS / "tables"
 """The folder of the committed tables."""
-RELATIVE, ABSOLUTE = 5e-4, 5e-5
+RELATIVE = 5e-4
+ABSOLUTE = 5e-5
 """Differences that are due to rounding to four digits, relative to a number and absolute."""
 
 
@@ -100,7 +101,8 @@ class NotebookRecord:
             print(
                 f"{self._settings()}: checks that assume the defaults are observations; text may not apply"
             )
-        data, contents = variables["data"], []
+        data = variables["data"]
+        contents = []
         if run := os.environ.get(folders.RUN_VARIABLE):
             self.out = Path(run)
             contents = read_json_object(self.out / folders.PARAMETERS).get("files", [])
@@ -111,7 +113,8 @@ class NotebookRecord:
             self.out = folders.claim_results(results / folders.LAB, data, given)
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
-        method, area = ZoneMethod.from_variables(variables), variables.get("area", "")
+        method = ZoneMethod.from_variables(variables)
+        area = variables.get("area", "")
         self.cache = DataCache(
             self.out, data, area, variables.get("seed", 0), method, contents
         )
@@ -151,7 +154,8 @@ class NotebookRecord:
         if supported is None or supported != supported:
             result = "not decidable here"
         if isinstance(supported, str):
-            result, supported = supported, supported == "supported"
+            result = supported
+            supported = supported == "supported"
         self._record("claim", what, _is_true(supported), value, result)
 
     def figure(self, figure: Figure, name: str) -> None:

@@ -121,13 +121,12 @@ def check_parameters(
     ------
     DataError : a parameter is unknown to all notebooks, has another type, or is out of its range.
     """
+    given = dict(given)
     if given.get("area") not in (None, "", AUTO):
-        given = {**given, "area": str(as_area(given["area"]))}
+        given["area"] = str(as_area(given["area"]))
     if "reading" in given:
-        given = {
-            **given,
-            "reading": ZoneMethod(reading=given["reading"]).read_options().as_json(),
-        }
+        recipe = ZoneMethod(reading=given["reading"]).read_options()
+        given["reading"] = recipe.as_json()
     defaults: dict[str, list[Any]] = {}
     for notebook in notebooks:
         for name, value in read_defaults(notebook).items():
@@ -158,11 +157,7 @@ def check_parameters(
 
 
 def _check_type(name: str, value: Any, default: Any) -> None:
-    is_whole = (
-        isinstance(default, float)
-        and isinstance(value, int)
-        and not isinstance(value, bool)
-    )
+    is_whole = type(default) is float and type(value) is int
     if not is_whole and type(value) is not type(default):
         raise DataError(
             f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {value!a:.80}"
