@@ -26,6 +26,8 @@ CRUISE_FRACTION = 0.95
 # a barrier condition with at most this residual holds the robot back [m]
 ACTIVE_RESIDUAL = 1e-4
 
+# The steps whose control is applied: all but that of the last state.
+_APPLIED = slice(0, -1)
 # Metrics of `Step.solve_time`, each with its quantile.
 SOLVE_TIMES = {
     "solve_time_median": 0.5,
@@ -103,59 +105,25 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     """
     dt = run.settings.dt
     n_people = len(run.zones)
-    way = run.until_arrival
-    applied = slice(0, -1)
-    parts = {
-        "": slice(None),
-        "_people": slice(n_people),
-        "_walls": slice(n_people, None),
-    }
-    speed = run.speed[way]
-    jerk = np.diff(run.states[way, 2:], n=2, axis=0) / dt**2
-    cruising = (
-        np.arange(len(speed))
-        <= np.flatnonzero(speed >= CRUISE_FRACTION * speed.max())[-1]
-    )
-    has_moved = np.maximum.accumulate(speed > STOPPED_SPEED)
+    states = run.states[run.until_arrival]
+    jerk = np.diff(states[:, 2:], n=2, axis=0) / dt**2
     has_residuals = run.residual.shape[2] > 0 or not n_people
-    violated = (nanmin(run.h, axis=1) < -TOLERANCE)[1:]
-    overlap = (nanmin(run.clearance, axis=1) < -TOLERANCE)[1:]
-    safe = run.safe[applied]
-    counted = {
-        "violations": violated,
-        "overlaps": overlap,
-        "infeasible_steps": run.slack[applied] > TOLERANCE,
-        "claimed_safe_steps": safe,
-        "flagged_steps": run.flagged[applied],
-        "unflagged_violations": safe & violated,
-        "unflagged_overlaps": safe & overlap,
-        **{f"steps_{name}": run.status[applied] == name for name in STATUSES},
-    }
+    yielding = dt * int(find_yielding_steps(run).sum()) if has_residuals else np.nan
     return {
         "success": run.success,
         "outcome": classify_outcome(run),
         "time_to_goal": np.nan if run.arrival is None else round(dt * run.arrival, 9),
-        "path_length": measure_path_length(run.states[way, :2]),
-        **{f"min_h{of}": _min_or_nan(run.h[:, part]) for of, part in parts.items()},
-        **{
-            f"min_clearance{of}": _min_or_nan(run.clearance[:, part])
-            for of, part in parts.items()
-        },
-        "min_speed": float(
-            speed[(run.time[way] >= START_UP_TIME) & cruising].min(initial=speed.max())
-        ),
-        "mean_speed": float(speed.mean()),
-        "max_speed": float(speed.max()),
-        "time_stopped": dt * int((has_moved & (speed < STOPPED_SPEED))[:-1].sum()),
-        "time_yielding": dt * int(find_yielding_steps(run).sum())
-        if has_residuals
-        else np.nan,
+        "path_length": measure_path_length(states[:, :2]),
+        **_find_minima("min_h", run.h, n_people),
+        **_find_minima("min_clearance", run.clearance, n_people),
+        **_measure_speed(run),
+        "time_yielding": yielding,
         "passing_side": find_passing_side(run),
         "jerk": float((jerk**2).sum(axis=1).mean()) if len(jerk) else 0.0,
         "people": n_people,
         "walls": len(run.scenario.fixed),
-        **{name: int(steps.sum()) for name, steps in counted.items()},
-        "max_slack": float(run.slack[applied].max(initial=0.0)),
+        **_count_steps(run),
+        "max_slack": float(run.slack[_APPLIED].max(initial=0.0)),
         **{
             name: float(np.quantile(run.solve_time, share))
             for name, share in SOLVE_TIMES.items()
@@ -163,14 +131,62 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     }
 
 
-def measure_path_length(points: Array) -> float:
-    """Length of the polygon through `points`, shape (n, 2) [m]."""
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+def _find_minima(name: str, values: Array, n_people: int) -> dict[str, float]:
+    """The smallest of the `values` of shape (states, obstacles): of all, of people, of what is fixed."""
+    return {
+        name: _min_or_nan(values),
+        f"{name}_people": _min_or_nan(values[:, :n_people]),
+        f"{name}_walls": _min_or_nan(values[:, n_people:]),
+    }
 
 
 def _min_or_nan(values: Array) -> float:
     smallest = float(nanmin(values))
     return smallest if np.isfinite(smallest) else np.nan
+
+
+def _measure_speed(run: Run) -> dict[str, float]:
+    """Speed of the robot until the arrival, and the time for which it stands after it has moved."""
+    speed = run.speed[run.until_arrival]
+    fast = np.flatnonzero(speed >= CRUISE_FRACTION * speed.max())
+    counts = run.time[run.until_arrival] >= START_UP_TIME
+    counts[fast[-1] + 1 :] = False
+    has_moved = np.maximum.accumulate(speed > STOPPED_SPEED)
+    stands = has_moved & (speed < STOPPED_SPEED)
+    return {
+        "min_speed": float(speed[counts].min(initial=speed.max())),
+        "mean_speed": float(speed.mean()),
+        "max_speed": float(speed.max()),
+        "time_stopped": run.settings.dt * int(stands[:-1].sum()),
+    }
+
+
+def _count_steps(run: Run) -> dict[str, int]:
+    """The numbers of steps with each property that `compute_metrics` counts."""
+    violated = _is_violated(run.h)[1:]
+    overlap = _is_violated(run.clearance)[1:]
+    safe = run.safe[_APPLIED]
+    properties = {
+        "violations": violated,
+        "overlaps": overlap,
+        "infeasible_steps": run.slack[_APPLIED] > TOLERANCE,
+        "claimed_safe_steps": safe,
+        "flagged_steps": run.flagged[_APPLIED],
+        "unflagged_violations": safe & violated,
+        "unflagged_overlaps": safe & overlap,
+        **{f"steps_{name}": run.status[_APPLIED] == name for name in STATUSES},
+    }
+    return {name: int(steps.sum()) for name, steps in properties.items()}
+
+
+def _is_violated(values: Array) -> NDArray[np.bool_]:
+    """True at the states, shape (n,), where some of the `values`, shape (n, obstacles), is below 0."""
+    return nanmin(values, axis=1) < -TOLERANCE
+
+
+def measure_path_length(points: Array) -> float:
+    """Length of the polygon through `points`, shape (n, 2) [m]."""
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def find_yielding_steps(run: Run) -> NDArray[np.bool_]:
@@ -195,10 +211,14 @@ def locate_along_course(run: Run, person: int) -> tuple[Array, Array]:
     -------
     (ahead, left), each of shape (n,) [m].
     """
+    return _project_on_course(run, run.people[:, person, :2] - run.states[:, :2])
+
+
+def _project_on_course(run: Run, offset: Array) -> tuple[Array, Array]:
+    """The parts of an `offset`, shape (n, 2), along the line from start to goal, and to its left [m]."""
     course = run.scenario.goal - run.scenario.start[:2]
-    course = course / np.hypot(*course)
-    offset = run.people[:, person, :2] - run.states[:, :2]
-    return offset @ course, offset @ np.array([-course[1], course[0]])
+    x, y = course / max(float(np.hypot(*course)), 1e-12)
+    return offset @ np.array([x, y]), offset @ np.array([-y, x])
 
 
 def find_passing_side(run: Run) -> str:
@@ -207,7 +227,7 @@ def find_passing_side(run: Run) -> str:
     "right" means: the person is to the left of the line from start to goal when abeam of the robot.  "none"
     means: the person is never abeam.
     """
-    if not run.zones or np.array_equal(run.scenario.goal, run.scenario.start[:2]):
+    if not run.zones:
         return "none"
     closest = int(nanmin(run.clearance[:, : len(run.zones)], axis=0).argmin())
     ahead, left = locate_along_course(run, closest)
@@ -232,12 +252,8 @@ def find_avoidance_start(
     -------
     (distance, h) [m], interpolated between two states; NaN if the robot stays on the line.
     """
-    start = run.scenario.start[:2]
-    course = run.scenario.goal - start
-    beside = run.states[:, :2] - start
-    beside = np.abs(beside[:, 0] * course[1] - beside[:, 1] * course[0]) / np.hypot(
-        *course
-    )
+    way = run.states[:, :2] - run.scenario.start[:2]
+    beside = np.abs(_project_on_course(run, way)[1])
     rows = np.flatnonzero(beside > deviation)
     if not len(rows):
         return np.nan, np.nan
@@ -265,7 +281,7 @@ def classify_outcome(run: Run) -> Outcome:
     "deadlock" : the robot has stopped although a free path leads to the goal.
     "out of time" : the robot is still moving at the end.
     """
-    violated = np.flatnonzero(nanmin(run.h, axis=1) < -TOLERANCE)
+    violated = np.flatnonzero(_is_violated(run.h))
     if len(violated):
         return _classify_violation(run, int(violated[0]))
     if run.success:
@@ -282,7 +298,8 @@ def _classify_violation(run: Run, k: int) -> Outcome:
     if i >= len(run.zones):
         return "hit wall"
     states = [max(k - 1, 0), k]
-    robot, person = run.states[states, :2], run.people[states, i, :2]
+    robot = run.states[states, :2]
+    person = run.people[states, i, :2]
     to_robot = robot[0] - person[0]
     if -np.diff(robot, axis=0)[0] @ to_robot > np.diff(person, axis=0)[0] @ to_robot:
         return "drove in"
@@ -330,7 +347,7 @@ def classify_strategy(run: Run) -> Strategy:
     A controller that does not report its conditions is never "infeasible" and never "waits".
     """
     metrics = compute_metrics(run)
-    if (nanmin(run.h, axis=1) < -TOLERANCE).any():
+    if _is_violated(run.h).any():
         return "h < 0"
     if metrics["infeasible_steps"]:
         return "infeasible"
@@ -350,8 +367,6 @@ def compute_retreat(run: Run) -> float:
 
     It is measured from the farthest point that the robot has reached so far.
     """
-    start = run.scenario.start[:2]
-    course = run.scenario.goal - start
-    length = max(float(np.hypot(*course)), 1e-12)
-    along = (run.states[:, :2] - start) @ course / length
+    way = run.states[:, :2] - run.scenario.start[:2]
+    along = _project_on_course(run, way)[0]
     return float((np.maximum.accumulate(along) - along).max())
