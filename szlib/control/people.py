@@ -22,9 +22,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, dist, hypot, inf, isfinite
-from typing import Any, NamedTuple, Protocol, TypeGuard
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -292,6 +292,8 @@ SAME_PERSON = 2.0
 SAME_PLACE = 0.5
 """Distance from where a lost person is expected up to which a new id means the same person [m] (assumed)."""
 _LastSeen = tuple[Person, float]  # a person as last seen, and when [s]
+# a measurement: the `Person` if one was given, x, y [m], vx, vy [m/s]
+_Row = tuple[Person | None, float, float, float, float]
 People = Sequence[Person] | ArrayLike
 """People as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
 
@@ -373,35 +375,37 @@ class Tracker:
         ------
         SolverError : an argument has the wrong type or shape: an error of the program, not of a sensor.
         """
-        self._set_clock(now := check_time(now))
-        has_ids = ids is not None or bool(self._last_seen)
-        if not has_ids and stamps is None and _have_no_ids(people):
-            return TrackedPeople(tuple(people))
-        rows = _split_rows(people)
+        now, rows = check_time(now), _split_rows(people)
+        self._set_clock(now)
+        known = [row[0] for row in rows if row[0] and row[0].id is None]
+        is_plain = ids is None and stamps is None and not self._last_seen
+        if is_plain and len(known) == len(rows):
+            return TrackedPeople(tuple(known))
         names, given = _check_names(ids, rows)
-        times = _check_stamps(stamps, len(rows), now)
+        times = _as_floats("stamps", now if stamps is None else stamps)
+        expected = f"one time, or one for each of {len(rows)} people"
+        is_each = times.shape in ((), (len(rows),))
+        require(is_each, "stamps", times.shape, expected, SolverError)
         self._last_seen = {
             k: v for k, v in self._last_seen.items() if abs(now - v[1]) <= self.memory
         }
-        present: list[Person | None] = []
-        rejected = unknown = 0
-        for row, name, time in zip(rows, names, times, strict=True):
-            if name is not None and (given[name] > 1 or name != name):  # NaN
+        present, rejected, unknown = list[Person](), 0, 0
+        each_time = np.broadcast_to(times, len(rows)).tolist()
+        for row, name, time in zip(rows, names, each_time, strict=True):
+            if given[name] > 1 or name != name:  # NaN
                 name = None
             last = None if name is None else self._recall(row, name, time, now, given)
-            found, usable = self._update(row, name, time, now, last)
-            if found is not None and name is not None and (usable or last is not None):
-                self._last_seen[name] = found
-            present.append(None if found is None else _move_forward(*found, now))
-            rejected += not usable or present[-1] is None
-            unknown += (not usable and last is None) or present[-1] is None
-        present += [
-            _move_forward(*seen, now)
-            for name, seen in self._last_seen.items()
-            if name not in given
-        ]
-        known = tuple(person for person in present if person is not None)
-        return TrackedPeople(known, rejected, unknown)
+            seen, is_usable = self._update(row, name, time, now, last)
+            if seen and name is not None and (is_usable or last):
+                self._last_seen[name] = seen
+            person = _move_forward(*seen, now) if seen else None
+            present += [person] if person else []
+            rejected += not (is_usable and person)
+            unknown += not ((is_usable or last) and person)
+        for name, seen in self._last_seen.items():
+            person = None if name in given else _move_forward(*seen, now)
+            present += [person] if person else []
+        return TrackedPeople(tuple(present), rejected, unknown)
 
     def _set_clock(self, now: float) -> None:
         """Begin a step at the time `now`; if the clock went back, so do the times of everybody."""
@@ -417,15 +421,15 @@ class Tracker:
 
     def _recall(
         self,
-        row: Person | list[float],
+        row: _Row,
         name: Hashable,
         time: float,
         now: float,
         given: Counter[Hashable],
     ) -> _LastSeen | None:
         """What is known of the person of a measurement: by their id, or by their place if the id is new."""
-        last, is_in_time = self._last_seen.get(name), time <= now + self.memory
-        if not is_in_time:
+        last = self._last_seen.get(name)
+        if not time <= now + self.memory:
             return last
         if last is None:
             lost = {
@@ -444,53 +448,36 @@ class Tracker:
 
     def _update(
         self,
-        row: Person | list[float],
+        row: _Row,
         name: Hashable,
         time: float,
         now: float,
         last: _LastSeen | None,
     ) -> tuple[_LastSeen | None, bool]:
         """The last known state of a person, if any, and True if all numbers of the measurement are usable."""
-        if isinstance(row, Person) and name is None and time == now:
-            return (row, now), True
-        x, y, vx, vy = (
-            (*row.position, *row.velocity) if isinstance(row, Person) else row
-        )
+        person, x, y, vx, vy = row
+        if person and name is None and time == now:
+            return (person, now), True
         if not _are_usable(x, y):
             return last, False
-        heading = zone = prediction = group = None
-        if isinstance(row, Person):
-            heading, zone = row.heading, row.zone
-            prediction, group = row.prediction, row.group
-        if not abs(now - time) <= self.memory:
+        if not (abs(now - time) <= self.memory and (last or _are_usable(vx, vy))):
+            zone = person.zone if person else None
             return last or (Person((x, y), zone=zone, id=name), now), False
-        if last is not None and time < last[1]:
+        if last and time < last[1]:
             return last, True
-        if not _are_usable(vx, vy):
-            return (Person((x, y), id=name), now) if last is None else (
-                last[0].at((x, y)),
-                time,
-            ), False
-        is_given = heading is not None and (
-            vx == vy == 0 or name is None or heading != atan2(vy, vx)
-        )
-        if not is_given and hypot(vx, vy) >= self.walking_speed:
-            heading = atan2(vy, vx)
-        elif not is_given:
-            heading = None if last is None else last[0].heading
-        return (
-            Person(
-                (x, y),
-                (vx, vy),
-                heading,
-                zone,
-                name,
-                heading is None,
-                prediction,
-                group,
-            ),
-            time,
-        ), True
+        if last and not _are_usable(vx, vy):
+            return (last[0].at((x, y)), time), False
+        seen = person or Person((x, y), (vx, vy), heading_unknown=True)
+        heading, is_moving = seen.heading, (vx, vy) != (0.0, 0.0)
+        if heading is None or (
+            is_moving and name is not None and heading == atan2(vy, vx)
+        ):
+            heading = last[0].heading if last else None
+            if hypot(vx, vy) >= self.walking_speed:
+                heading = atan2(vy, vx)
+        is_unknown = heading is None
+        seen = replace(seen, id=name, heading=heading, heading_unknown=is_unknown)
+        return (seen, time), True
 
 
 def _move_forward(person: Person, time: float, now: float) -> Person | None:
@@ -503,49 +490,36 @@ def _move_forward(person: Person, time: float, now: float) -> Person | None:
     return person.after(now - time)
 
 
-def _measure_deviation(
-    row: Person | list[float], time: float, person: Person, seen: float
-) -> float:
+def _measure_deviation(row: _Row, time: float, person: Person, seen: float) -> float:
     """Distance from a measurement of this `time` to where a `person`, `seen` before, is expected [m]."""
-    x, y = row.position if isinstance(row, Person) else row[:2]
-    expected = _move_forward(person, seen, time)
-    is_known = expected is not None and _are_usable(x, y)
-    return dist((x, y), expected.position) if expected and is_known else inf
+    expected, place = _move_forward(person, seen, time), row[1:3]
+    is_known = expected and _are_usable(*place)
+    return dist(place, expected.position) if expected and is_known else inf
 
 
 def _are_usable(x: float, y: float) -> bool:
     return abs(x) <= LARGEST and abs(y) <= LARGEST
 
 
-def _have_no_ids(people: People) -> TypeGuard[Sequence[Person]]:
-    """True if these are `Person`s without ids."""
-    if not isinstance(people, list | tuple):
-        return False
-    for person in people:  # noqa: SIM110 - all() takes three times as long
-        if not isinstance(person, Person) or person.id is not None:
-            return False
-    return True
-
-
 def _split_rows(people: Any) -> list[Any]:
-    """People one by one: `Person`s, or (x, y, vx, vy), finite or not."""
+    """People one by one, with their numbers, finite or not."""
     if isinstance(people, Iterable) and not isinstance(people, np.ndarray):
         people = list(people)
-        if all(isinstance(person, Person) for person in people):
-            return list(people)
+        if not [each for each in people if not isinstance(each, Person)]:
+            return [(each, *each.position, *each.velocity) for each in people]
     expected = "Persons, or numbers of shape (n, 4): x, y, vx, vy"
     numbers = _as_floats("people", people, expected)
     is_rows = numbers.shape[1:] == (4,) or not numbers.size
     require(is_rows, "people", numbers.shape, expected, SolverError)
-    return list(numbers.reshape(-1, 4).tolist())
+    return [(None, *each) for each in numbers.reshape(-1, 4).tolist()]
 
 
 def _check_names(
-    ids: Iterable[Hashable] | None, rows: Sequence[Person | list[float]]
+    ids: Iterable[Hashable] | None, rows: Sequence[_Row]
 ) -> tuple[list[Hashable], Counter[Hashable]]:
     """The id of each person, or None, and how often each id was given."""
     try:
-        names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
+        names = [row[0] and row[0].id for row in rows] if ids is None else list(ids)
         given = Counter(name for name in names if name is not None)
     except TypeError as error:
         raise SolverError(
@@ -554,18 +528,6 @@ def _check_names(
     expected = f"one for each of {len(rows)} people"
     require(len(names) == len(rows), "ids", len(names), expected, SolverError)
     return names, given
-
-
-def _check_stamps(stamps: ArrayLike | None, n: int, now: float) -> list[float]:
-    """When each person was measured [s], finite or not."""
-    if stamps is None:
-        return [now] * n
-    times, expected = (
-        _as_floats("stamps", stamps),
-        f"one time, or one for each of {n} people",
-    )
-    require(times.shape in ((), (n,)), "stamps", times.shape, expected, SolverError)
-    return list(np.broadcast_to(times, n).tolist())
 
 
 def check_time(now: float) -> float:
