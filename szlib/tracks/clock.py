@@ -18,7 +18,7 @@ checks it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from ..core import memory
 from ..core.checks import check_columns, check_rows, require
 from ..core.errors import DataError
 from . import funnels
-from .readers import is_sorted, read_raw
+from .readers import read_raw
 from .recipe import SHORTEST_GAP, Recipe, find_recipe
 from .sources import is_table
 
@@ -49,13 +49,10 @@ _ROUNDING = 1e-6
 
 _LAST_SECOND = 1e11  # latest time [s]; up to here ticks are exact
 
-# rows brought to the clock at a time; their arrays fit into the processor's cache
-_ROWS_AT_ONCE = 1 << 17
-
 # More samples than this share, and than a few, without a tick mean that times or ids were misread (assumed).
 _MOST_LOST, _FEW = 0.5, 20
 
-_BYTES_PER_TICK = 160  # memory of a tick while a table is brought to the clock [bytes] (measured: 147 to 153)
+_BYTES_PER_TICK = 200  # memory of a tick while a table is brought to the clock [bytes] (measured: 188)
 
 # greatest difference between velocities and those from positions [m/s]
 _TOLERANCE = 1e-6
@@ -152,73 +149,63 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     if max_gap is None:
         max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
     require(max_gap > SHORTEST_GAP, "max_gap", max_gap, "longer than the clock's 0.1 s")
-    within = np.r_[False, same & (step <= max_gap + _ROUNDING)]
-    ticks = float(step.sum(where=within[1:])) * TICKS_PER_SECOND
+    within = same & (step <= max_gap + _ROUNDING)
+    ticks = float(step.sum(where=within)) * TICKS_PER_SECOND
     memory.require(
         ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows"
     )
-    x, y = raw["x"].to_numpy(float), raw["y"].to_numpy(float)
-    blocks = [
-        (_on_clock(t[rows], x[rows], y[rows], within[rows]), rows.start)
-        for rows in _blocks(within)
-    ]
-    row = np.concatenate([block.pop("row") + start for block, start in blocks])
-    covered = sum(int(block.pop("covered")) for block, _ in blocks)
-    day = raw["day"].astype("category").array.take(row)
-    columns = {
-        name: np.concatenate([block[name] for block, _ in blocks])
-        for name in COLUMNS[2:]
-    }
+    row, columns, n_covered = _on_clock(t, raw[["x", "y"]].to_numpy(float).T, within)
     table = pd.DataFrame(
-        {"day": day, "id": raw["id"].to_numpy()[row], **columns}, copy=False
+        {"day": raw["day"].astype("category").array.take(row)}
+        | {"id": raw["id"].to_numpy()[row]}
+        | dict(zip(COLUMNS[2:], columns, strict=True)),
+        copy=False,
     )
-    if len(t) - covered > _MOST_LOST * len(t) + _FEW:
+    if len(t) - n_covered > _MOST_LOST * len(t) + _FEW:
         raise DataError(
-            f"{len(t) - covered:,} of {len(t):,} samples lie in pieces shorter than a step of 0.1 s: "
+            f"{len(t) - n_covered:,} of {len(t):,} samples lie in pieces shorter than a step of 0.1 s: "
             "are times seconds, and ids people?  Else pass time_unit or frame_rate, or a longer max_gap"
         )
-    rejected = {"in a gap-free piece that covers no tick": len(t) - covered}
-    stages = [
-        *funnels.get(raw),
-        funnels.stage("clock: samples", len(t), covered, rejected),
-    ]
+    rejected = {"in a gap-free piece that covers no tick": len(t) - n_covered}
+    stage = funnels.stage("clock: samples", len(t), n_covered, rejected)
     table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
-    return funnels.attach(table, stages)
-
-
-def _blocks(within: np.ndarray) -> Iterator[slice]:
-    """Blocks of rows that end where a piece does; `within` (n,): whether a row continues a piece."""
-    begins = np.flatnonzero(~within)
-    cuts = np.unique(
-        begins[np.searchsorted(begins, np.arange(0, begins[-1] + 1, _ROWS_AT_ONCE))]
-    )
-    return map(slice, cuts, np.r_[cuts[1:], len(within)])
+    return funnels.attach(table, [*funnels.get(raw), stage])
 
 
 def _on_clock(
-    t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray
-) -> dict[str, np.ndarray]:
-    """The ticks of whole pieces: t, x, y, vx, vy, the row before each; and how many rows are covered."""
-    piece = np.cumsum(~within) - 1
-    row, tick = _ticks(t, piece)
-    after = row + np.r_[within[1:], False][row]
-    moment, before, of = tick / TICKS_PER_SECOND, t[row], piece[row]
-    weight = np.clip(
-        (moment - before) / np.where(after > row, t[after] - before, 1.0), 0.0, 1.0
-    )
-    x, y = (values[row] + weight * (values[after] - values[row]) for values in (x, y))
-    vx, vy = _velocities(of, x, y)
-    any_tick = np.zeros(piece[-1] + 1, bool)
-    any_tick[of] = True
-    return {
-        "row": row,
-        "t": moment,
-        "x": x,
-        "y": y,
-        "vx": vx,
-        "vy": vy,
-        "covered": any_tick[piece].sum(),
-    }
+    t: np.ndarray, xy: np.ndarray, within: np.ndarray
+) -> tuple[np.ndarray, list[np.ndarray], int]:
+    """The ticks of all pieces: the row before each; t, x, y, vx, vy; how many rows have a tick.
+
+    `within` says of each row but the first whether it continues a piece.
+    """
+    begin = np.flatnonzero(np.r_[True, ~within])
+    size = np.diff(begin, append=len(t))
+    end = begin + size - 1
+    next_tick = np.ceil((t - _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
+    last = np.floor((t[end] + _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
+    first = next_tick[begin]
+    count = np.maximum(last - first + 1, 0)
+    start = np.cumsum(count) - count
+    piece = np.repeat(np.arange(len(begin)), count)
+    at = np.arange(len(piece))
+    tick = at - np.repeat(start - first, count)
+    slot = next_tick - np.repeat(
+        first - start, size
+    )  # of the first tick after each row
+    row = np.repeat(np.arange(len(t)), np.diff(slot, append=len(piece)))
+    row = np.minimum(row, np.maximum(end - 1, begin)[piece])
+    after = np.minimum(row + 1, end[piece])
+    moment = tick / TICKS_PER_SECOND
+    step = np.where(after > row, t[after] - t[row], 1.0)
+    weight = np.clip((moment - t[row]) / step, 0.0, 1.0)
+    x, y = (each[row] + weight * (each[after] - each[row]) for each in xy)
+    reach = round(VELOCITY_SPAN * TICKS_PER_SECOND)
+    low = np.maximum(at - reach, start[piece])
+    high = np.minimum(at + reach, (start + count - 1)[piece])
+    duration = np.where(high > low, (high - low) / TICKS_PER_SECOND, np.nan)
+    vx, vy = ((each[high] - each[low]) / duration for each in (x, y))
+    return row, [moment, x, y, vx, vy], int(size[count > 0].sum())
 
 
 def compute_velocities(tracks: pd.DataFrame) -> np.ndarray:
@@ -275,7 +262,9 @@ def _order_rows(
     them.  Raises DataError where a person has two rows at one time.
     """
     person = _person_codes(frame)
-    order = slice(None) if is_sorted(person, time) else np.lexsort((time, person))
+    later = time[1:] >= time[:-1]
+    is_next = (person[1:] > person[:-1]) | (person[1:] == person[:-1]) & later
+    order = slice(None) if is_next.all() else np.lexsort((time, person))
     person, time = person[order], time[order]
     same, step = person[1:] == person[:-1], np.diff(time)
     expected = "this person has two rows at this time; keep one of them"
@@ -309,36 +298,6 @@ def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
             "without a type count as seconds: divide milliseconds by 1000; if they are seconds, pass max_gap"
         )
     return max_gap
-
-
-def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every tick within every piece: the input row before it, and its number."""
-    tolerance = TICKS_PER_SECOND * _ROUNDING
-    first = np.ceil(t * TICKS_PER_SECOND - tolerance).astype(np.int64)
-    last_of_piece = np.r_[piece[1:] != piece[:-1], True]
-    end = np.where(
-        last_of_piece,
-        np.floor(t * TICKS_PER_SECOND + tolerance).astype(np.int64) + 1,
-        np.r_[first[1:], 0],
-    )
-    count = np.maximum(end - first, 0)
-    row = np.repeat(np.arange(len(t)), count)
-    tick = np.arange(len(row)) + np.repeat(first - np.cumsum(count) + count, count)
-    # the row before a tick must not be the last of its piece, as interpolation needs a row after it
-    alone = last_of_piece & np.r_[True, last_of_piece[:-1]]
-    return row - (last_of_piece & ~alone)[row], tick
-
-
-def _velocities(piece: np.ndarray, *positions: np.ndarray) -> Iterator[np.ndarray]:
-    """Displacement over +-0.5 s within each piece, by its duration [m/s]; NaN for a single tick."""
-    reach = round(VELOCITY_SPAN * TICKS_PER_SECOND)
-    row = np.arange(len(piece))
-    starts = np.flatnonzero(np.r_[True, piece[1:] != piece[:-1]][: len(piece)])
-    lengths = np.diff(np.r_[starts, len(piece)])
-    start, end = np.repeat(starts, lengths), np.repeat(starts + lengths - 1, lengths)
-    before, after = np.maximum(row - reach, start), np.minimum(row + reach, end)
-    duration = np.where(after > before, (after - before) / TICKS_PER_SECOND, np.nan)
-    return ((each[after] - each[before]) / duration for each in positions)
 
 
 def _person_codes(frame: pd.DataFrame) -> np.ndarray:

@@ -9,7 +9,6 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,26 +29,23 @@ _USUAL = {
     "traj trajid trajectory trajectoryid object objectid objid participant subject fußgänger fußgängerid "
     "personne piéton identifiant persona peatón pessoa pedone человек 人 人物 人物id 歩行者 歩行者id "
     "行人 行人id 보행자",
-    "x": "x posx xpos positionx xposition xcoord coordx xcoordinate centerx x座標 x坐标",
-    "y": "y posy ypos positiony yposition ycoord coordy ycoordinate centery y座標 y坐标",
+    "x": "x posx xpos positionx xposition xcoord coordx xcoordinate centerx x座標 x坐标 lon longitude lng",
+    "y": "y posy ypos positiony yposition ycoord coordy ycoordinate centery y座標 y坐标 lat latitude",
     "day": "day",
 }
-_GEOGRAPHIC = {"x": ("lon", "longitude", "lng"), "y": ("lat", "latitude")}
-_TIME_NAMES = {
-    "s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "ns": "ns", "days": "days",
-}  # fmt: skip
+_GEOGRAPHIC = ["lon", "longitude", "lng", "lat", "latitude"]
+_TIME_NAMES = {name: name for name in TIME_UNITS} | {"sec": "s", "seconds": "s"}
 _POSITION_NAMES = {
     **{name: name for name in UNITS},
-    "px": PIXELS,
-    "pixel": PIXELS,
-    "pixels": PIXELS,
+    **dict.fromkeys(("px", "pixel", "pixels"), PIXELS),
+    **dict.fromkeys(("deg", "degrees"), DEGREES),
+    "feet": "ft",
+    "yards": "yd",
 }
-_POSITION_NAMES |= {"feet": "ft", "yards": "yd", "deg": DEGREES, "degrees": DEGREES}
-_RECORDINGS = frozenset({
-    "recording", "recordingid", "scene", "sceneid", "camera", "cameraid", "cam", "session", "sessionid",
-    "sequence", "sequenceid", "video", "videoid", "date", "run", "runid", "trial", "trialid", "experiment",
-    "clip", "place", "location", "locationid", "site", "dataset",
-})  # fmt: skip
+_RECORDINGS = (
+    "recording recordingid scene sceneid camera cameraid cam session sessionid sequence sequenceid video "
+    "videoid date run runid trial trialid experiment clip place location locationid site dataset"
+)
 _CLOCK = re.compile(r"(time|sec|stamp|frame|zeit|hour|minute)")  # in names of times
 _LONGEST_SHARE = (
     5  # people have so many rows under each value that tells recordings apart
@@ -79,60 +75,44 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
         origin; it says which columns look like what.
     """
     names, where = source.names, source.where + source.head
-    given, keys = dict(recipe.columns or {}), [_split_unit(name) for name in names]
+    given = dict(recipe.columns or {})
     for k in given.values():
         if isinstance(k, int) and not 0 <= k < len(names):
             raise DataError(
                 f"{where} has no field {k}; it has {len(names)}, the first is 0"
             )
-    given |= {} if {"t", "frame"} & given.keys() else _find_sums(source, keys)
-    at = {quantity: _candidates(quantity, given, names, keys) for quantity in _USUAL}
+    at = {quantity: _candidates(quantity, given, names) for quantity in _USUAL}
     is_free = "t" not in given and bool(at["frame"])
-    is_frame = "frame" in given or (
-        is_free and (not at["t"] or recipe.frame_rate is not None)
-    )
-    time = "frame" if is_frame else "t"
+    is_frame = is_free and (not at["t"] or recipe.frame_rate is not None)
+    time = "frame" if "frame" in given or is_frame else "t"
     needed = [time, "id", "x", "y", *(["day"] if at["day"] else [])]
-    _require_clear(where, {quantity: at[quantity] for quantity in needed}, names, given)
+    for quantity in needed:
+        same = sorted(map(str, set(at[quantity])))
+        if len(same) > 1:
+            advice = advise(columns={**given, quantity: at[quantity][0]})
+            raise DataError(
+                f"{where}: {', '.join(same)} can all be {quantity}; {advice}"
+            )
+        if len(at[quantity]) > 1:
+            raise DataError(f"{where} names {same[0]} twice; rename one of them")
     found = given | {quantity: at[quantity][0] for quantity in needed if at[quantity]}
     if missing := [quantity for quantity in needed if quantity not in found]:
         lacking = ", ".join(str(given.get(quantity, quantity)) for quantity in missing)
         raise DataError(
             f"{where} has no column {lacking}; {_suggest(source, recipe, found, missing)}"
         )
-    units = {keys[names.index(found[c])][1] if found[c] in names else "" for c in "xy"}
-    stated = {_POSITION_NAMES.get(unit) for unit in units}
-    if all(
-        found[c] in names and keys[names.index(found[c])][0] in _GEOGRAPHIC[c]
-        for c in "xy"
-    ):
-        stated = {DEGREES}
-    clock = keys[names.index(found["t"])][1] if found.get("t") in names else ""
+    keys = {q: _split_unit(at) for q, at in found.items() if at in names}
+    units = {_POSITION_NAMES.get(keys[c][1]) if c in keys else None for c in "xy"}
+    if all(c in keys and keys[c][0] in _GEOGRAPHIC for c in "xy"):
+        units = {DEGREES}
     recipe = Recipe(columns=found).over(recipe)
-    if not recipe.time_unit and clock in _TIME_NAMES:
-        recipe = replace(recipe, time_unit=_TIME_NAMES[clock])
-    if not (recipe.unit or recipe.has_places) and len(stated) == 1:
-        recipe = replace(recipe, unit=stated.pop())
+    clock = _TIME_NAMES.get(keys.get("t", ("", ""))[1])
+    if clock and not recipe.time_unit and recipe.frame_rate is None:
+        recipe = replace(recipe, time_unit=clock)
+    if not (recipe.unit or recipe.has_places) and len(units) == 1:
+        recipe = replace(recipe, unit=units.pop())
     _require_known(where, recipe)
     return recipe
-
-
-def _require_clear(
-    where: str,
-    at: Mapping[str, Sequence[str | int]],
-    names: Sequence[str],
-    given: Mapping[str, str | int],
-) -> None:
-    """Raise DataError where several columns can hold one quantity, or a name is there twice."""
-    for quantity, found in at.items():
-        same = sorted(map(str, set(found)))
-        if len(same) > 1:
-            advice = advise(columns={**given, quantity: found[0]})
-            raise DataError(
-                f"{where}: {', '.join(same)} can all be {quantity}; {advice}"
-            )
-        if len(found) > 1:
-            raise DataError(f"{where} names {same[0]} twice; rename one of them")
 
 
 def _require_known(where: str, recipe: Recipe) -> None:
@@ -144,16 +124,16 @@ def _require_known(where: str, recipe: Recipe) -> None:
             f"frames: {advise(columns={'frame': columns['t']})}"
         )
     if "frame" in columns and recipe.frame_rate is None:
+        guesses["frame_rate"] = _FRAMES
         missing.append(
             f"{columns['frame']!r} counts frames; pass frame_rate=, frames a second of the video"
         )
-        guesses["frame_rate"] = _FRAMES
     if recipe.unit == PIXELS and not recipe.has_places:
+        guesses["scale"] = _PIXEL
         missing.append(
             "positions are in pixels; pass scale=, metres in a pixel, or homography=, 3 x 3 numbers that map "
             "pixels to the floor"
         )
-        guesses["scale"] = _PIXEL
     if missing:
         numbers = " and ".join(f"{value:g}" for value in guesses.values())
         verb = "are only guesses" if len(guesses) > 1 else "is only a guess"
@@ -177,11 +157,8 @@ def column_of(source: Source, at: str | int) -> pl.Series:
                 f"{source.where} has no column {at}; it has {list(known)[:12]}"
             )
         columns = {root: source.column(known[root]) for root in roots}
-        if "||" not in at and "'" not in at:
-            columns = {
-                root: to_numbers(values, source.decimal)
-                for root, values in columns.items()
-            }
+        if not re.search(r"\|\||'", at):
+            columns = {k: to_numbers(v, source.decimal) for k, v in columns.items()}
         return pl.DataFrame(columns).select(sum_.alias("c")).to_series()
     except pl.exceptions.PolarsError as error:
         raise DataError(
@@ -190,30 +167,31 @@ def column_of(source: Source, at: str | int) -> pl.Series:
 
 
 def ask_about_recordings(
-    source: Source, recipe: Recipe, t: pl.Series, ids: pl.Series, *, by_name: bool
+    source: Source, recipe: Recipe, rows: pl.DataFrame, *, by_name: bool
 ) -> None:
     """Raise DataError where a column of `source` that the `recipe` does not use tells recordings apart.
 
     Such a column has few values, and changes where people are at one time twice, or go back in time.  With
     `by_name` one is also asked about if it has a usual name, and people are seen under several of its values.
-    `t` and `ids` are those of all rows.
+    `rows` has id and t of all rows.
     """
-    rows = pl.DataFrame({"id": ids, "t": t})
-    is_mixed, columns = _begins_again(rows, ["id"]), recipe.columns or {}
+    step = pl.col("t").diff()
+    is_mixed = rows.select((step.over("id") <= 0).any()).item()
+    columns = recipe.columns or {}
     used = " ".join(map(str, columns.values()))
     for k, name in enumerate(source.names):
         key = _split_unit(name)[0]
-        if k in columns.values() or (name and name in used) or _CLOCK.search(key):
+        is_usual = by_name and key in _RECORDINGS.split()
+        if (name or f"f{k}") in used or k in columns.values() or _CLOCK.search(key):
             continue
-        is_usual = by_name and key in _RECORDINGS
         if not (is_mixed or is_usual):
             continue
-        table = rows.with_columns(c=source.column(k).cast(pl.String))
+        table = rows.select("id", "t", c=source.column(k).cast(pl.String))
         n_pieces = table.select("id", "c").n_unique()
         if table["c"].n_unique() < 2 or n_pieces * _LONGEST_SHARE > len(rows):
             continue
-        is_shared = n_pieces > rows["id"].n_unique()
-        if is_shared and (is_usual or not _begins_again(table, ["id", "c"])):
+        is_still = table.select((step.over("id", "c") <= 0).any()).item()
+        if n_pieces > rows["id"].n_unique() and (is_usual or not is_still):
             raise DataError(
                 f"{source.where}: column {name or k!r} changes where people or times begin again, so it "
                 f"seems to tell recordings apart; {advise(columns={'day': name or k})}; "
@@ -221,67 +199,27 @@ def ask_about_recordings(
             )
 
 
-def _begins_again(rows: pl.DataFrame, keys: list[str]) -> bool:
-    """Whether somebody is seen twice at one time, or goes back in time, among rows of the same `keys`."""
-    step = rows.select(pl.col("t").diff().over(keys)).to_series()
-    return bool((step <= 0).any())
-
-
-def _split_unit(name: str) -> tuple[str, str]:
+def _split_unit(name: object) -> tuple[str, str]:
     """A name without blanks, accents and capitals, and its unit: ("posx", "mm") of "Pos X [mm]"."""
-    letters = unicodedata.normalize("NFKD", name.casefold())
-    words = re.findall(
-        r"[^\W_]+", "".join(each for each in letters if not unicodedata.combining(each))
-    )
+    letters = unicodedata.normalize("NFKD", str(name).casefold())
+    words = re.findall(r"[^\W_]+", letters)
     has_unit = len(words) > 1 and words[-1] in (*_POSITION_NAMES, *_TIME_NAMES)
     unit = words.pop() if has_unit else ""
     return "".join(words), unit
 
 
-def _find_sums(source: Source, keys: Sequence[tuple[str, str]]) -> dict[str, str | int]:
-    """Column t as the sum of seconds and nanoseconds, or of a date and a time of day; else nothing."""
-    by_key = {"".join(key): source.names[k] for k, key in enumerate(keys)}
-    for key, name in by_key.items():
-        for nano, seconds in (
-            ("nanosec", "sec"),
-            ("nanosecs", "secs"),
-            ("nsec", "sec"),
-            ("nsecs", "secs"),
-        ):
-            if key.endswith(nano) and (
-                whole := by_key.get(key.removesuffix(nano) + seconds)
-            ):
-                return {"t": f'"{whole}" + 1e-9 * "{name}"'}
-    usual = {_split_unit(each)[0] for each in _USUAL["t"].split()}
-    clock = next((k for k, (key, _) in enumerate(keys) if key in usual), None)
-    date = by_key.get("date")
-    if clock is None or date is None:
-        return {}
-    first = source.column(clock).head(1).to_list()
-    if first and isinstance(first[0], str) and re.match(r"\d{1,2}:\d\d", first[0]):
-        return {"t": f'"{date}" || \'T\' || "{source.names[clock]}"'}
-    return {}
-
-
 def _candidates(
-    quantity: str,
-    given: Mapping[str, str | int],
-    names: Sequence[str],
-    keys: Sequence[tuple[str, str]],
+    quantity: str, given: Mapping[str, str | int], names: Sequence[str]
 ) -> list[str | int]:
     """The columns that can hold a quantity: the one given, those with its name, or with a usual one."""
-    at = given.get(quantity)
-    if isinstance(at, int):
-        return [at]
-    if at is not None:
-        is_sum = re.search(r"[-+*/|(]", at) is not None
-        return [name for name in names if name == at] or ([at] if is_sum else [])
-    if exact := [name for name in names if name == quantity]:
-        return list(exact)
-    usual = {_split_unit(each)[0] for each in _USUAL[quantity].split()} | set(
-        _GEOGRAPHIC.get(quantity, ())
-    )
-    return [names[k] for k, (key, _) in enumerate(keys) if key in usual]
+    at = given.get(quantity, quantity)
+    if same := [name for name in names if name == at]:
+        return list(same)
+    if quantity in given:
+        is_sum = isinstance(at, int) or re.search(r"[-+*/|(]", at)
+        return [at] if is_sum else []
+    usual = {_split_unit(each)[0] for each in _USUAL[quantity].split()}
+    return [name for name in names if _split_unit(name)[0] in usual]
 
 
 def _suggest(
@@ -292,40 +230,33 @@ def _suggest(
 ) -> str:
     """As which columns people would walk, and how to read them.  A constant column is none of them."""
     names = [name or k for k, name in enumerate(source.names)]
-    columns = {
-        at: _as_floats(column_of(source, at).head(_SAMPLE)) for at in found.values()
-    }
-    for name in names[:_LISTED]:
-        if name in columns or len(columns) == _TRIED:
-            continue
-        numbers = _as_floats(column_of(source, name).head(_SAMPLE))
+    columns = dict[str | int, np.ndarray]()
+    for at in dict.fromkeys([*found.values(), *names[:_LISTED]]):
+        numbers = _as_floats(column_of(source, at).head(_SAMPLE))
         usable = numbers[np.isfinite(numbers)]
-        if 2 * len(usable) > len(numbers) and np.ptp(usable) > 0:
-            columns[name] = numbers
+        is_varied = 2 * len(usable) > len(numbers) and np.ptp(usable) > 0
+        if at in found.values() or (is_varied and len(columns) < _TRIED):
+            columns[at] = numbers
     time = "frame" if "frame" in (*found, *missing) else "t"
-    at, shown = [found.get(name) for name in (time, "id", "x", "y")], list(columns)
-    known = [None if name is None else shown.index(name) for name in at]
+    shown = list(columns)
+    known = [
+        shown.index(found[name]) if name in found else None
+        for name in (time, "id", "x", "y")
+    ]
     reading = replace(recipe, columns=dict(found) or None)
-    if columns and (
-        advice := suggest_columns(
-            np.array(list(columns.values())), shown, known, reading
-        )
-    ):
+    values = np.array(list(columns.values()))
+    if columns and (advice := suggest_columns(values, shown, known, reading)):
         return advice
-    listed = ", ".join(map(repr, names[:12]))
     given = dict(recipe.columns or {}) | dict.fromkeys(missing, "...")
-    return f"it has {listed}; {advise(columns=given)}"
+    return f"it has {', '.join(map(repr, names[:12]))}; {advise(columns=given)}"
 
 
 def _as_floats(values: pl.Series) -> np.ndarray:
     """A column as floats, whatever it holds: numbers, times, or texts of which each gets a number."""
-    for decimal in (".", ","):
-        numbers = to_numbers(values, decimal)
-        if 2 * numbers.null_count() <= len(values):
-            return to_times(numbers, "UTC")[0].fill_null(np.nan).to_numpy()
-    times = to_times(values, "UTC")[0]
-    if 2 * times.null_count() <= len(values):
-        return times.fill_null(np.nan).to_numpy()
+    for decimal in ".,":
+        times = to_times(values, "UTC", decimal=decimal)[0]
+        if 2 * times.null_count() <= len(values):
+            return times.fill_null(np.nan).to_numpy()
     return to_ids(values, "").cast(pl.Float64).fill_null(np.nan).to_numpy()
 
 
@@ -335,10 +266,7 @@ def _as_floats(values: pl.Series) -> np.ndarray:
 def to_numbers(values: pl.Series, decimal: str = ".") -> pl.Series:
     """The numbers in a column of `values`; null where one is no number.  `decimal` is the point of texts."""
     if values.dtype == pl.String:
-        values = values.str.strip_chars(" \"'")
-        values = (
-            values.str.replace(",", ".", literal=True) if decimal == "," else values
-        )
+        values = values.str.strip_chars(" \"'").str.replace(decimal, ".", literal=True)
     try:
         return values.cast(pl.Float64, strict=False)
     except pl.exceptions.PolarsError:  # a list, an object
@@ -354,28 +282,34 @@ def to_times(
     without a zone are those of `tz`.  Returns seconds, since 1970 where times are dates; and the local date
     of each where the column states its zone, else None.
     """
-    if values.dtype == pl.Duration:
-        return values.dt.total_nanoseconds() / 1e9, None
-    if isinstance(values.dtype, pl.Datetime | pl.Date):
-        zone = getattr(values.dtype, "time_zone", None)
-        dates = values.cast(pl.Datetime("ns", zone)).to_pandas()
-        if zone is not None:
-            return _since_1970(dates), values.dt.replace_time_zone(None).dt.date()
-        return _since_1970(_localize(dates, tz)), None
-    numbers = to_numbers(values, decimal)
+    numbers, day = to_numbers(values, decimal), None
     if values.dtype == pl.String and 2 * numbers.null_count() > len(values):
         text = values.str.strip_chars(" \"'")
         dates = text.set(~text.str.contains(_DATE).fill_null(False), None).to_pandas()
         parsed = pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce")
-        has_zone = text.str.contains(_ZONE).fill_null(False)
-        if has_zone.any():
+        has_zone = text.str.contains(_ZONE).fill_null(False).to_numpy()
+        zone = "UTC" if has_zone.any() else None
+        if zone:
+            parsed = parsed.where(has_zone)
             day = text.str.slice(0, 10).str.to_date("%Y-%m-%d", strict=False)
-            return _since_1970(parsed.where(has_zone.to_numpy())), day
         if parsed.notna().any():
-            return _since_1970(_localize(parsed.dt.tz_localize(None), tz)), None
-    if unit == "days":
+            values = pl.Series(parsed).dt.replace_time_zone(zone)
+    elif unit == "days" and not values.dtype.is_temporal():
         ms = ((numbers - _EXCEL_1970) * 86_400_000).round()
-        return to_times(ms.cast(pl.Int64, strict=False).cast(pl.Datetime("ms")), tz)
+        values = ms.cast(pl.Int64, strict=False).cast(pl.Datetime("ms"))
+    if values.dtype == pl.Duration:
+        return values.dt.total_nanoseconds() / 1e9, None
+    if isinstance(values.dtype, pl.Datetime | pl.Date):
+        moments = values.cast(
+            pl.Datetime("ns", getattr(values.dtype, "time_zone", None))
+        )
+        if moments.dtype.time_zone is None:  # type: ignore[attr-defined]
+            moments = moments.dt.replace_time_zone(
+                tz, ambiguous="null", non_existent="null"
+            )
+        elif day is None:
+            day = moments.dt.date()
+        return moments.dt.epoch("ns") / 1e9, day
     middle = numbers.drop_nans().abs().quantile(0.5) or 0.0
     usual = next((name for least, name in _SINCE_1970.items() if middle >= least), "s")
     return numbers * TIME_UNITS[unit or usual], None
@@ -388,42 +322,25 @@ def to_ids(values: pl.Series, where: str) -> pl.Series:
     of 100,000 people share one with a probability below 1e-6.  Raises DataError, beginning with `where`, if
     two texts are one number.
     """
-    if values.dtype.is_numeric():
-        return _to_whole(values)
-    text = values.cast(pl.String).str.strip_chars(" \"'")
-    text = text.set(text == "", None)
-    n_numbers = text.cast(pl.Float64, strict=False).count()
-    if 2 * n_numbers < text.count():
-        names = text.drop_nulls().unique()
+    if not values.dtype.is_numeric():
+        values = values.cast(pl.String).str.strip_chars(" \"'")
+        values = values.set(values == "", None)
+    number = values.cast(pl.Float64, strict=False)
+    if values.dtype == pl.String and 2 * number.count() < values.count():
+        names = values.drop_nulls().unique()
         hashes = pd.util.hash_array(names.to_numpy().astype(object), categorize=False)
         numbers = pl.Series((hashes >> _SHORT).astype("int64"))
-        return text.replace_strict(names, numbers, default=None)
-    whole = _to_whole(text)
-    known = pl.DataFrame({"text": text, "id": whole}).drop_nulls().unique()
-    alike = known.filter(pl.col("id").is_duplicated()).sort("id", "text")["text"]
-    if len(alike):
-        raise DataError(
-            f"{where}: the ids {alike[0]!r} and {alike[1]!r} are the same number; write them alike if they "
-            f"are one person, else as names, such as 'p{alike[0]}' and 'p{alike[1]}'"
-        )
-    return whole
-
-
-def _to_whole(values: pl.Series) -> pl.Series:
-    """The whole numbers among `values`, numbers or texts; null for others."""
-    number = values.cast(pl.Float64, strict=False)
+        return values.replace_strict(names, numbers, default=None)
     is_whole = (number == number.floor()) & (number.abs() < _EXACT)
-    whole = pl.select(pl.when(is_whole).then(number).cast(pl.Int64, strict=False))
-    exact = values.cast(pl.Int64, strict=False) if not values.dtype.is_float() else None
-    return whole.to_series() if exact is None else exact.fill_null(whole.to_series())
-
-
-def _localize(times: Any, tz: str) -> Any:
-    """Times of the clock in `tz`; those that its changes make ambiguous are missing."""
-    return times.dt.tz_localize(tz, ambiguous="NaT", nonexistent="NaT")
-
-
-def _since_1970(times: Any) -> pl.Series:
-    """Times with a zone as seconds since 1970; null where they are missing."""
-    seconds = (times - pd.Timestamp(0, tz="UTC")).dt.total_seconds()
-    return pl.Series(seconds.to_numpy()).fill_nan(None)
+    whole = number.set(~is_whole, None).cast(pl.Int64, strict=False)
+    if not values.dtype.is_float():
+        whole = values.cast(pl.Int64, strict=False).fill_null(whole)
+    if values.dtype == pl.String:
+        known = pl.DataFrame({"text": values, "id": whole}).drop_nulls().unique()
+        alike = known.filter(pl.col("id").is_duplicated()).sort("id", "text")["text"]
+        if len(alike):
+            raise DataError(
+                f"{where}: the ids {alike[0]!r} and {alike[1]!r} are the same number; write them alike if "
+                f"they are one person, else as names, such as 'p{alike[0]}' and 'p{alike[1]}'"
+            )
+    return whole

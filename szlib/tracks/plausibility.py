@@ -38,8 +38,6 @@ MOST_SHOWN = 200_000  # number of rows that are looked at
 _DEGREE = 111_320.0  # metres in a degree of latitude, or of longitude at the equator
 _WALK = 1.2  # a usual walking speed [m/s]
 _FRAMES = 25.0  # a usual frame rate [1/s], for suggestions
-_LIKE_THIS = "people walk if it is read like this"
-_SURE = ("atc-raw", "ewap")  # shapes whose units cannot be others
 # letters in a line of a map; letters from nobody to most people
 _MAP, _INK = (60, " .:+#")
 
@@ -164,7 +162,7 @@ def check_unit(rows: pl.DataFrame, recipe: Recipe, path: Path) -> None:
 def is_table_known(recipe: Recipe) -> bool:
     """Whether files of the shape in the `recipe` cannot have other units or columns."""
     shape = SHAPES[recipe.file_format or "tidy"]
-    return shape.parse is not None or shape.name in _SURE
+    return shape.is_sure or bool(shape.parse)
 
 
 def find_implausible(rows: pl.DataFrame) -> list[str]:
@@ -205,18 +203,9 @@ def suggest_reading(seen: np.ndarray, recipe: Recipe) -> str:
 
     The rows t [s], id, x, y [m] were `seen` with the recipe, shape (4, n).
     """
-    seen, columns = seen[:, np.isfinite(seen).all(axis=0)], recipe.columns or {}
-    if not seen.size:
-        return ""
-    quantities = ("t", "id", "x", "y")
-    names = [columns.get(name, name) for name in quantities]
-    if advice := suggest_columns(seen, names, range(4), recipe):
-        return advice
-    order = _find_walking(seen, 4 * [None], [1.0] * 4, is_counted=False)
-    if "t" not in columns or order in (None, [0, 1, 2, 3]):
-        return ""
-    exchanged = dict(zip(quantities, [names[k] for k in order or ()], strict=True))
-    return f"{_LIKE_THIS}: {advise(columns=exchanged)}"
+    names = [(recipe.columns or {}).get(name, name) for name in ("t", "id", "x", "y")]
+    seen = seen[:, np.isfinite(seen).all(axis=0)]
+    return suggest_columns(seen, names, range(4), recipe) if seen.size else ""
 
 
 def suggest_columns(
@@ -234,46 +223,52 @@ def suggest_columns(
     known : number of the column of t, id, x and y, None where it is unknown.
     recipe : with the columns that are known.
     """
-    for change, factors, is_counted in _changes(values, recipe, None not in known):
-        order = _find_walking(values, known, factors, is_counted=is_counted)
+    given = recipe.columns or {}
+    for change, factors, is_counted, at in _changes(values, recipe, known):
+        order = _find_walking(values, at, factors, is_counted=is_counted)
         if order is None:
             continue
         quantities = ("frame" if is_counted else "t", "id", "x", "y")
         columns = {name: names[k] for name, k in zip(quantities, order, strict=True)}
-        if columns.items() <= (recipe.columns or {}).items():
-            if not change:
-                continue
-        else:
+        if not columns.items() <= given.items():
             change = {"columns": columns, **change}
-        rate = f"{_FRAMES:g} frames a second are only a guess: "
-        guess = rate if "frame_rate" in change else ""
-        return f"{_LIKE_THIS}: {guess}{advise(**change)}"
+        if change:
+            rate = f"{_FRAMES:g} frames a second are only a guess: "
+            guess = rate if "frame_rate" in change else ""
+            return f"people walk if it is read like this: {guess}{advise(**change)}"
     return ""
 
 
-def _changes(
-    values: np.ndarray, recipe: Recipe, is_read: bool
-) -> Iterator[tuple[dict[str, Any], list[float], bool]]:
-    """Changes of a `recipe`, the likeliest first.
+Change = tuple[dict[str, Any], list[float], bool, Sequence[int | None]]
 
-    Each with the factors of t, id, x and y, and whether t is counted in frames.  With `is_read` the rows of
-    `values` are t [s], id, x, y [m].
+
+def _changes(
+    values: np.ndarray, recipe: Recipe, known: Sequence[int | None]
+) -> Iterator[Change]:
+    """Changes of a `recipe`, the likeliest first, where the columns of t, id, x, y are `known`, or some.
+
+    Each with the factors of t, id, x and y, whether t is counted in frames, and the columns that it keeps.
+    Where all are known, the rows of `values` are t [s], id, x, y [m].
     """
-    is_frame = "frame" in (recipe.columns or {})
+    is_frame, is_read = "frame" in (recipe.columns or {}), None not in known
     for is_counted in (not is_read,) if is_frame else (False, True):
         more = {"frame_rate": _FRAMES} if is_counted and not recipe.frame_rate else {}
         rate = (recipe.frame_rate or _FRAMES) if is_counted else 1.0
         for unit in ("m", "mm", "cm", "ft"):
             factor = UNITS[unit] / (recipe.metres or 1.0)
             change = more if factor == 1 else {"unit": unit, **more}
-            yield change, [1 / rate, 1, factor, factor], is_counted
-    if is_read and not is_frame and recipe.time_unit is None:
+            yield change, [1 / rate, 1, factor, factor], is_counted, known
+    if not is_read or is_frame:
+        return
+    if recipe.time_unit is None:
         for unit in ("ms", "days"):
-            yield {"time_unit": unit}, [TIME_UNITS[unit], 1, 1, 1], False
-    if is_read and (np.abs(values[2]) <= 180).all() and (np.abs(values[3]) <= 90).all():
+            yield {"time_unit": unit}, [TIME_UNITS[unit], 1, 1, 1], False, known
+    if (np.abs(values[2]) <= 180).all() and (np.abs(values[3]) <= 90).all():
         lon, lat = (round(float(np.median(each)), 2) for each in values[2:4])
         east = _DEGREE * np.cos(np.radians(lat))
-        yield {"unit": DEGREES, "origin": [lon, lat]}, [1, 1, east, _DEGREE], False
+        degrees = {"unit": DEGREES, "origin": [lon, lat]}
+        yield degrees, [1, 1, east, _DEGREE], False, known
+    yield {}, [1, 1, 1, 1], False, [None] * 4  # in another order
 
 
 def _find_walking(

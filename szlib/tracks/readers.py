@@ -31,15 +31,7 @@ from .plausibility import (
     suggest_reading,
 )
 from .recipe import Recipe, advise, find_recipe
-from .rows import (
-    EXPECTED,
-    FARTHEST,
-    LAST_SECOND,
-    Rows,
-    load_rows,
-    open_source,
-    scan_streamed,
-)
+from .rows import EXPECTED, Rows, load_rows, open_rows, open_source
 from .shapes import SHAPES, require_format
 from .sources import is_table, open_table, require_memory, unpacked
 
@@ -47,15 +39,17 @@ from .sources import is_table, open_table, require_memory, unpacked
 MISSING, NO_ID = "missing or not a number", "id not a whole number"
 MAX_REJECTED = 0.05
 """Share of the rows of a file that may be unusable, unless a `Recipe` gives another (assumed)."""
-_SCANNED = (
-    2  # bytes of memory for each of a text that is scanned (measured: 1.3 to 1.9)
-)
 MOST_DOUBLED = 0.2
 """Share of rows up to which a person may have a second place at one time (assumed)."""
 # A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
 CALENDAR_BEGINS = 1e8
-_DAY, _MINUTE = 86_400, 60  # [s]
+LAST_SECOND = (
+    4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
+)
+FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 _HEAD = 1 << 16  # bytes of a text by which its day is found
+# bytes of memory for each of a text that is scanned (measured: 1.3 to 1.9)
+_SCANNED = 2
 
 # A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
 # distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
@@ -69,22 +63,31 @@ class LoadedFile(NamedTuple):
     ----------
     path : the file.
     rows : its usable rows: day, id, t [s], x, y [m].
-    stages : its funnel.
+    stage : of its funnel.
     recipe : how it was read, with its columns.
     """
 
     path: Path
     rows: pl.DataFrame
-    stages: list[dict[str, Any]]
+    stage: dict[str, Any]
     recipe: Recipe
+
+    @property
+    def is_named(self) -> bool:
+        """Whether its name is its day: it has no calendar, and can be a piece of a recording."""
+        is_text, name = self.rows.schema["day"] == pl.String, file_stem(self.path)
+        return (
+            is_text and not self.is_sequence and bool((self.rows["day"] == name).all())
+        )
 
     @property
     def is_sequence(self) -> bool:
         """Whether each file of this shape is a recording of its own, without a calendar."""
         return SHAPES[self.recipe.file_format or "tidy"].is_sequence
 
-    def with_day(self, day: pl.Expr) -> LoadedFile:
-        """The same rows under another `day`."""
+    def with_day(self, day: str | pl.Expr) -> LoadedFile:
+        """The same rows under another `day`, or the same for all."""
+        day = pl.lit(day) if isinstance(day, str) else day
         return self._replace(rows=self.rows.with_columns(day=day))
 
 
@@ -127,21 +130,13 @@ def read_raw(
     0  walk   1  0.0  0.0  0.0
     1  walk   1  0.4  0.5  0.0
     """
-    sources = (
-        [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
-    )
+    is_one = isinstance(paths, str | Path) or is_table(paths)
+    sources = [paths] if is_one else list(paths)
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
     if not sources:
         raise DataError("no track file was given; pass at least one path")
     recipe = find_recipe(sources, recipe)
-    names = (
-        Path(f"table-{k}") if is_table(each) else Path(each)
-        for k, each in enumerate(sources, start=1)
-    )
-    files = [
-        _read_file(source, path, recipe)
-        for source, path in zip(sources, names, strict=True)
-    ]
+    files = [_read_file(source, k, recipe) for k, source in enumerate(sources, 1)]
     return merge(separate_recordings(files), excluded, select)
 
 
@@ -154,118 +149,148 @@ def merge(
 
     Days `excluded` are left out, and rows that `select` leaves out.
     """
-    parts = [file.rows for file in files]
+    parts, keys = [file.rows for file in files], ["day", "id", "t"]
     if len({part.schema["day"] for part in parts}) > 1:
         parts = [part.with_columns(pl.col("day").cast(pl.String)) for part in parts]
-    merged = pl.concat(parts)
-    wanted = (
-        merged.filter(~pl.col("day").cast(pl.String).is_in(excluded))
-        if excluded
-        else merged
-    )
-    gaps = [file.recipe.max_gap for file in files if file.recipe.max_gap is not None]
-    max_gap = max(gaps) if len(gaps) == len(files) else None
+    merged = wanted = pl.concat(parts)
+    if excluded:
+        wanted = merged.filter(~pl.col("day").cast(pl.String).is_in(excluded))
+    gaps = [file.recipe.max_gap for file in files]
+    max_gap = None if None in gaps else max(filter(None, gaps))
     areas = {file.recipe.area for file in files}
     area = areas.pop() if len(areas) == 1 else None
     near = wanted if select is None else select(wanted, area, max_gap)
-    keys = ["day", "id", "t"]
-    rows = _sort(near)
+    day = near["day"].rank("dense").to_numpy().astype("int32") - 1
+    order = np.lexsort((near["t"].to_numpy(), near["id"].to_numpy(), day))
+    rows = near[order]  # several times as fast as Polars sorts by three columns
     again = pl.all_horizontal(pl.col(keys).eq_missing(pl.col(keys).shift()))
     elsewhere = again & pl.any_horizontal(pl.col("x", "y").diff() != 0)
-    if rows.select(again.any()).item():
-        if (n := rows.select(elsewhere.sum()).item()) > MOST_DOUBLED * rows.height:
-            names = ", ".join(printable(file.path.name) for file in files[:3])
-            raise DataError(
-                f"{names}: {n:,} of {rows.height:,} rows give a person a second place at one time; name the "
-                "column of the recording, as columns={'day': ...}, or one with the whole time: seconds "
-                "without their fraction are not enough"
-            )
-        rows = rows.filter(~again)
+    names = ", ".join(printable(file.path.name) for file in files[:3])
+    if (n := rows.select(elsewhere.sum()).item()) > MOST_DOUBLED * rows.height:
+        raise DataError(
+            f"{names}: {n:,} of {rows.height:,} rows give a person a second place at one time; name the "
+            "column of the recording, as columns={'day': ...}, or one with the whole time: seconds "
+            "without their fraction are not enough"
+        )
+    is_first = ~rows.select(again).to_series()
+    rows = rows.filter(is_first)
     doubled = {"duplicate (day, id, t)": near.height - rows.height}
     _warn_rejected("all files", doubled)
     if rows.height == 0:
         raise DataError(
             f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`"
         )
+    columns = {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}
+    days = pd.Index(near["day"].unique().sort().cast(pl.String).to_list())
     frame = pd.DataFrame(
-        {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}
+        {"day": pd.Categorical.from_codes(day[order][is_first], days), **columns}
     )
-    days = rows["day"].unique().sort()
-    codes = (
-        rows["day"]
-        .replace_strict(days, range(len(days)), return_dtype=pl.Int32)
-        .to_numpy()
-    )
-    names = pd.Index(days.cast(pl.String).to_list())
-    frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, names)))
-    frame.attrs["max_gap"] = max_gap
+    frame.attrs |= {"max_gap": max_gap, "recipe": files[0].recipe.as_json()}
     if area is not None:
         frame.attrs["area"] = area
-    frame.attrs["recipe"] = files[0].recipe.as_json()
+    stages = [file.stage for file in files]
+    for text in find_implausible(rows):
+        warn(f"{names}: {text}")
+        name = f"{funnels.WARNING}{text}"
+        stages.append(funnels.stage(name, merged.height, merged.height, {}))
     far = {"never near the area": wanted.height - near.height}
     reasons = {"excluded day": merged.height - wanted.height, **far, **doubled}
-    stages = [stage for file in files for stage in file.stages]
-    for text in find_implausible(rows):
-        warn(f"{', '.join(file.path.name for file in files[:3])}: {text}")
-        stages.append(
-            funnels.stage(f"{funnels.WARNING}{text}", merged.height, merged.height, {})
-        )
-    return funnels.attach(
-        frame,
-        [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)],
-    )
+    last = funnels.stage("merge files", merged.height, rows.height, reasons)
+    return funnels.attach(frame, [*stages, last])
 
 
-def _sort(rows: pl.DataFrame) -> pl.DataFrame:
-    """Rows by day, id and t; rows of one day in the order of time are sorted by person only."""
-    if rows.height and rows["day"].n_unique() == 1:
-        if is_sorted(rows["id"].to_numpy(), rows["t"].to_numpy()):
-            return rows
-        if rows["t"].is_sorted():
-            return rows[order_by_person(rows["id"].to_numpy())]
-    return rows.sort("day", "id", "t", maintain_order=True)
-
-
-def order_by_person(person: np.ndarray) -> np.ndarray:
-    """The stable order of rows by `person`, in linear time for up to 65,536 people."""
-    number, people = pd.factorize(person, sort=True)
-    return np.argsort(number.astype(np.min_scalar_type(len(people))), kind="stable")
-
-
-def is_sorted(person: np.ndarray, time: np.ndarray) -> bool:
-    """Whether rows are in the order of `person`, then `time`."""
-    same = person[1:] == person[:-1]
-    return bool(((person[1:] > person[:-1]) | (same & (time[1:] >= time[:-1]))).all())
-
-
-def _read_file(source: Any, path: Path, recipe: Recipe) -> LoadedFile:
-    """The usable rows of one file or table."""
+def _read_file(source: Any, number: int, recipe: Recipe) -> LoadedFile:
+    """The usable rows of one file or table, of which a table is called by its `number`."""
     if not is_table(source):
+        path = Path(source)
         with unpacked(path) as plain:
-            if streamed := scan_streamed(plain, path, recipe):
-                found, scan = streamed
-                require_memory(plain.stat().st_size, f"{path}", _SCANNED)
-                return _accept(Rows(scan.collect(), found), path, recipe)
-            rows = load_rows(*open_source(plain, path, recipe), path)
+            rows = open_rows(plain, path, recipe)
+            if rows.source is None:
+                require_memory(plain.stat().st_size, f"{path}", factor=_SCANNED)
             return _accept(rows, path, recipe)
-    if not hasattr(source, "to_point_gdf") and hasattr(source, "frame_rate"):  # PedPy's
-        stated = Recipe(columns={"frame": "frame"}, frame_rate=float(source.frame_rate))
-        source, recipe = source.data, recipe.over(stated)
+    path = Path(f"table-{number}")
+    if hasattr(source, "data") and hasattr(source, "frame_rate"):  # PedPy's
+        rate = float(source.frame_rate)
+        source = source.data
+        recipe = recipe.over(Recipe(columns={"frame": "frame"}, frame_rate=rate))
     found = replace(recipe, file_format="tidy")
     return _accept(load_rows(open_table(source, f"{path}"), found, path), path, recipe)
 
 
-def _accept(rows: Rows, path: Path, recipe: Recipe) -> LoadedFile:
-    """The usable `rows` of file `path`, for which `recipe` was given."""
-    good, reasons, first = reject_rows(rows.table, rows)
-    is_known = is_table_known(rows.recipe)
-    is_doubtful = 2 * good.height < rows.table.height and not is_known
-    hint = suggest_reading(first_rows(rows.table), rows.recipe) if is_doubtful else ""
-    stage = read_stage(path, rows.recipe, good.height, reasons, first, hint)
-    check_people(good, rows.recipe, path, is_unit_given=recipe.has_places)
-    if not recipe.has_places:
-        check_unit(good, rows.recipe, path)
-    return LoadedFile(path, with_days(good, path, rows.recipe), [stage], rows.recipe)
+def _accept(rows: Rows, path: Path, given: Recipe) -> LoadedFile:
+    """The usable `rows` of file `path`, for which the recipe `given` was given.
+
+    Raises DataError where there is none, too many are rejected, or people cannot move like this.
+    """
+    recipe, table = rows.recipe, rows.table.collect()
+    marked = table.with_columns(reason=rejection_reason(table))
+    bad = marked.filter(pl.col("reason").is_not_null())
+    good = marked.filter(pl.col("reason").is_null()).drop("reason")
+    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
+    if bad.height:
+        _report_rejected(rows, table, bad, reasons, path)
+    if good.height == 0:
+        raise DataError(f"{path}: holds no row; {EXPECTED}")
+    rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
+    name = f"read {path.name}{rate}"
+    stage = funnels.stage(name, table.height, good.height, reasons)
+    check_people(good, recipe, path, is_unit_given=given.has_places)
+    if not given.has_places:
+        check_unit(good, recipe, path)
+    return LoadedFile(path, with_days(good, path, recipe), stage, recipe)
+
+
+def _report_rejected(
+    rows: Rows,
+    table: pl.DataFrame,
+    bad: pl.DataFrame,
+    reasons: dict[str, int],
+    path: Path,
+) -> None:
+    """Warn of the `bad` rows of a `table`, counted by reason; DataError above `Recipe.max_rejected`."""
+    recipe, n_bad, n = rows.recipe, bad.height, table.height
+    line, reason = bad.select("line", "reason").row(0)
+    held = ""
+    if reason in (MISSING, NO_ID):
+        name = next(name for name in ("t", "x", "y", "id") if bad[name][0] is None)
+        held = f" ({rows.show_field(line, name)})"
+    most = MAX_REJECTED if recipe.max_rejected is None else recipe.max_rejected
+    if n_bad <= most * n:
+        _warn_rejected(f"{path.name}, first at line {line}{held}", reasons)
+        return
+    advice = EXPECTED
+    if n_bad < n:
+        share = ceil(100 * n_bad / n) / 100
+        advice = f"if the others are right: {advise(max_rejected=share)}"
+    if 2 * n_bad > n and not is_table_known(recipe):
+        advice = suggest_reading(first_rows(table), recipe) or advice
+    raise DataError(
+        f"{path}, line {line}: {reason}{held}; {n_bad} of {n} rows cannot be used as {recipe.file_format}; "
+        f"{advice}"
+    )
+
+
+def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
+    counts = [f"{count} x {reason}" for reason, count in reasons.items() if count]
+    if counts:
+        warn(f"{where}: rejected rows: {', '.join(counts)}")
+
+
+def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
+    """Why a row of a `table` as from `open_file` is rejected; null where it is usable."""
+    numbers, places = pl.col("t", "x", "y"), pl.col("x", "y")
+    reasons = {
+        "missing or extra fields": pl.col("ragged"),
+        MISSING: pl.any_horizontal(numbers.is_null()),
+        NO_ID: pl.col("id").is_null(),
+        "not finite": ~pl.all_horizontal(numbers.is_finite()),
+        "time not in seconds since 1970": pl.col("t").abs() > LAST_SECOND,
+        "position not on Earth": pl.any_horizontal(places.abs() > FARTHEST),
+    }
+    if "day" in table.collect_schema():
+        reasons["no day"] = pl.col("day").is_null()
+    whens = [pl.when(holds).then(pl.lit(name)) for name, holds in reasons.items()]
+    return pl.coalesce(whens)
 
 
 @contextmanager
@@ -276,11 +301,8 @@ def open_file(path: Path, recipe: Recipe) -> Iterator[tuple[Recipe, pl.LazyFrame
     [m], and, where the file has it, speed [m/s].  Raises DataError where the file cannot be read.
     """
     with unpacked(path) as plain:
-        if (streamed := scan_streamed(plain, path, recipe)) is not None:
-            yield streamed
-            return
-        rows = load_rows(*open_source(plain, path, recipe), path)
-        yield rows.recipe, rows.table.lazy()
+        rows = open_rows(plain, path, recipe)
+        yield rows.recipe, rows.table
 
 
 def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:
@@ -304,91 +326,13 @@ def find_day(path: Path, recipe: Recipe) -> str | None:
     require_format(recipe)
     with suppress(DataError, OSError), unpacked(path) as plain:
         source, found = open_source(plain, path, recipe, size=_HEAD)
-        if SHAPES[found.file_format or "tidy"].is_sequence or "day" in (
-            found.columns or {}
-        ):
-            return None
         rows = load_rows(source, found, path, is_head=True)
-        good = reject_rows(rows.table)[0]
+        usable = rows.table.filter(rejection_reason(rows.table).is_null())
+        first = with_days(usable.head(1).collect(), path, rows.recipe)
         has_own = "day" in (rows.recipe.columns or {})
-        if good.height and not has_own and good["t"][0] >= CALENDAR_BEGINS:
-            return str(with_days(good.head(1), path, rows.recipe)["day"][0])
+        if first.height and not has_own and first["day"][0] != file_stem(path):
+            return str(first["day"][0])
     return None
-
-
-def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
-    """Why a row of a `table` as from `open_file` is rejected; null where it is usable."""
-    numbers = pl.col("t", "x", "y")
-    reasons = {
-        "missing or extra fields": pl.col("ragged"),
-        MISSING: pl.any_horizontal(numbers.is_null()),
-        NO_ID: pl.col("id").is_null(),
-        "not finite": ~pl.all_horizontal(numbers.is_finite()),
-        "time not in seconds since 1970": pl.col("t").abs() > LAST_SECOND,
-        "position not on Earth": pl.max_horizontal(pl.col("x", "y").abs()) > FARTHEST,
-    }
-    if "day" in table.collect_schema():
-        reasons["no day"] = pl.col("day").is_null()
-    return pl.coalesce(
-        pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons.items()
-    )
-
-
-def reject_rows(
-    table: pl.DataFrame, rows: Rows | None = None
-) -> tuple[pl.DataFrame, dict[str, int], tuple[int, str] | None]:
-    """The usable rows of a `table` as from `open_file`.
-
-    Also returns the number of the other rows by reason, and line and reason of the first one, with what the
-    file holds there if its `rows` are given.
-    """
-    marked = table.with_columns(reason=rejection_reason(table))
-    bad = marked.filter(pl.col("reason").is_not_null())
-    counts = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
-    first = bad.select("line", "reason").row(0) if bad.height else None
-    if first and first[1] in (MISSING, NO_ID) and rows is not None:
-        name = next(name for name in ("t", "x", "y", "id") if bad[name][0] is None)
-        first = (first[0], f"{first[1]} ({rows.show_field(first[0], name)})")
-    good = marked.filter(pl.col("reason").is_null())
-    return good.drop("reason"), counts, first
-
-
-def read_stage(
-    path: Path,
-    recipe: Recipe,
-    n_good: int,
-    reasons: dict[str, int],
-    first: tuple[int, str] | None,
-    hint: str = "",
-) -> dict[str, Any]:
-    """The funnel stage of file `path`, read with a `recipe`, of which `n_good` rows are usable.
-
-    `hint` says what to do if most are not, `reasons` count the others, `first` is line and reason of the
-    first of these.  Raises DataError where there is no row, or more than `Recipe.max_rejected` are rejected.
-    Fewer are a DataWarning.
-    """
-    n_bad = sum(reasons.values())
-    most = MAX_REJECTED if recipe.max_rejected is None else recipe.max_rejected
-    if first and n_bad > most * (n_bad + n_good):
-        share = ceil(100 * n_bad / (n_bad + n_good)) / 100
-        advice = (
-            f"if the others are right: {advise(max_rejected=share)}"
-            if n_good
-            else EXPECTED
-        )
-        raise DataError(
-            f"{path}, line {first[0]}: {first[1]}; {n_bad} of {n_bad + n_good} rows cannot be used "
-            f"as {recipe.file_format}; {hint or advice}"
-        )
-    if n_good == 0:
-        raise DataError(f"{path}: holds no row; {EXPECTED}")
-    if first:
-        detail = first[1].partition(" (")[2]
-        _warn_rejected(
-            f"{path.name}, first at line {first[0]}{detail and f' ({detail}'}", reasons
-        )
-    rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
-    return funnels.stage(f"read {path.name}{rate}", n_good + n_bad, n_good, reasons)
 
 
 def with_days(good: pl.DataFrame, path: Path, recipe: Recipe) -> pl.DataFrame:
@@ -398,39 +342,21 @@ def with_days(good: pl.DataFrame, path: Path, recipe: Recipe) -> pl.DataFrame:
     1970.
     """
     if "day" not in good.columns:
-        last = good["t"].max()
-        is_named = SHAPES[recipe.file_format or "tidy"].is_sequence or (
-            isinstance(last, float) and last < CALENDAR_BEGINS
-        )
-        day = (
-            pl.lit(file_stem(path))
-            if is_named
-            else _find_days(good["t"], recipe.tz or "UTC")
-        )
+        ends = good.select(pl.min("t"), pl.max("t").alias("last")).row(0)
+        shape = SHAPES[recipe.file_format or "tidy"]
+        day: Any = pl.lit(file_stem(path))
+        if good.height and not shape.is_sequence and ends[1] >= CALENDAR_BEGINS:
+            tz = recipe.tz or "UTC"
+            first, last = _local_dates(pl.Series(ends), tz)
+            day = pl.lit(first) if first == last else _local_dates(good["t"], tz)
         good = good.with_columns(day=day)
     return good.select("day", "id", "t", "x", "y")
 
 
-def _find_days(t: pl.Series, tz: str) -> pl.Series | pl.Expr:
-    """The local date of each time [s since 1970]; a single one where all minutes have the same date."""
-    first, last = (int(moment) // _MINUTE * _MINUTE for moment in (t.min(), t.max()))  # type: ignore[arg-type]
-    if last - first < _DAY:
-        days = _local_date(pl.Series(range(first, last + 1, _MINUTE)), tz).unique()
-        if len(days) == 1:
-            return pl.lit(days[0])
-    return _local_date(t.floor().cast(pl.Int64), tz)
-
-
-def _local_date(t: pl.Series, tz: str) -> pl.Series:
-    return pl.from_epoch(t, time_unit="s").dt.convert_time_zone(tz).dt.date()
-
-
-def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
-    counts = ", ".join(
-        f"{count} x {reason}" for reason, count in reasons.items() if count
-    )
-    if counts:
-        warn(f"{where}: rejected rows: {counts}")
+def _local_dates(t: pl.Series, tz: str) -> pl.Series:
+    """The date of each time [s since 1970] in the time zone `tz`."""
+    moments = pl.from_epoch(t.floor().cast(pl.Int64), time_unit="s")
+    return moments.dt.convert_time_zone(tz).dt.date()
 
 
 # --- several files ------------------------------------------------------------------------------------
@@ -439,7 +365,7 @@ def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
 def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     """Give different recordings among `files` another `day`, so that no person is in two of them.
 
-    Files without a calendar (see `to_metres`) are recordings of their own, called by their names, unless
+    Files without a calendar (see `with_days`) are recordings of their own, called by their names, unless
     people continue from one to the other, as in pieces of one recording (not for EWAP).  Files of a calendar
     day are its pieces.  If most of the people in both of two files are in two places at once, the files are
     separate recordings after all, with a DataWarning; if only some are, a DataError is raised.
@@ -449,30 +375,24 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
         return found
     check_names([file_stem(file.path) for file in files if file.is_sequence])
     names = name_recordings([file.path for file in files])
-    has_text_day = [file.rows["day"].dtype == pl.String for file in files]
-    is_named = [
-        is_text and file.rows["day"].unique().to_list() == [file_stem(file.path)]
-        for file, is_text in zip(files, has_text_day, strict=True)
-    ]
+    is_named = [file.is_named for file in files]
     candidates = [
-        file.rows.with_columns(day=pl.lit(""))
-        if named and not file.is_sequence
-        else file.rows.head(0)
+        file.with_day("") if named else file
         for file, named in zip(files, is_named, strict=True)
     ]
     joined = {
-        (j, k) for j, k, _, n_apart, _ in _find_shared_people(candidates) if not n_apart
+        (j, k)
+        for j, k, _, n_apart, _ in _find_shared_people(candidates)
+        if is_named[j] and is_named[k] and not n_apart
     }
     for k in (k for k, named in enumerate(is_named) if named):
         first = next((j for j in range(k) if (j, k) in joined), None)
-        found[k] = files[k].with_day(
-            pl.lit(names[k] if first is None else found[first].rows["day"][0])
-        )
-    for j, k, n_together, n_apart, example in _find_shared_people(
-        [file.rows for file in found]
-    ):
+        name = names[k] if first is None else str(found[first].rows["day"][0])
+        found[k] = files[k].with_day(name)
+    for j, k, n_together, n_apart, example in _find_shared_people(found):
         where = f"{printable(files[j].path.name)} and {printable(files[k].path.name)}"
-        if n_apart and (n_apart <= n_together or has_text_day[k]):
+        has_text_day = found[k].rows.schema["day"] == pl.String
+        if n_apart and (n_apart <= n_together or has_text_day):
             raise DataError(
                 f"{where}: person {example} is in two places at once ({n_apart} of {n_together + n_apart} "
                 "people in both files are); read these files one by one, or correct them"
@@ -481,59 +401,52 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
             warn(
                 f"{where}: {n_apart} people are in two places at once; read as two recordings"
             )
-            found[k] = files[k].with_day(
-                pl.format("{} {}", pl.col("day").cast(pl.String), pl.lit(names[k]))
-            )
+            day = pl.format("{} {}", pl.col("day").cast(pl.String), pl.lit(names[k]))
+            found[k] = files[k].with_day(day)
     return found
 
 
 def _find_shared_people(
-    parts: Sequence[pl.DataFrame],
+    files: Sequence[LoadedFile],
 ) -> list[tuple[int, int, int, int, int]]:
-    """Pairs of files that share people.
+    """Pairs of `files` that share people.
 
     For each: the numbers of both files, how many people continue from one to the other, how many are in two
     places at once, and one of the latter.
     """
     keys = [pl.col("day").cast(pl.String), pl.col("id", "t", "x", "y")]
-    rows = pl.concat(
-        [part.select(*keys, file=pl.lit(k, pl.Int32)) for k, part in enumerate(parts)]
-    )
-    rows = rows.filter((pl.col("file").min() != pl.col("file").max()).over("day", "id"))
-    rows = rows.sort("day", "id", "t", "file")
-    step = [
-        pl.col(name).diff().over("day", "id").alias(f"d{name}")
-        for name in ("t", "x", "y", "file")
-    ]
-    steps = rows.with_columns(step).filter(
-        (pl.col("dfile") != 0) & (pl.col("dt") <= _SOON)
-    )
-    before = pl.col("file") - pl.col("dfile")
-    steps = steps.with_columns(
-        j=pl.min_horizontal("file", before),
-        k=pl.max_horizontal("file", before),
-        apart=(pl.col("dx") ** 2 + pl.col("dy") ** 2).sqrt()
-        > _BLUR + _FASTEST * pl.col("dt"),
-    )
+    parts = [file.rows.select(*keys, file=pl.lit(k)) for k, file in enumerate(files)]
+    rows, person = pl.concat(parts), ["day", "id"]
+    rows = rows.filter((pl.min("file") != pl.max("file")).over(person))
+    step = pl.col("t", "x", "y", "file").diff().over(person).name.prefix("d")
+    steps = rows.sort(*person, "t", "file").with_columns(step)
+    before, moved = pl.col("file") - pl.col("dfile"), pl.col("dx", "dy") ** 2
     people = (
-        steps.group_by("j", "k", "day", "id")
-        .agg(pl.col("apart").any())
-        .sort("j", "k", "apart", "day", "id")
+        steps.filter((pl.col("dfile") != 0) & (pl.col("dt") <= _SOON))
+        .group_by(
+            *person,
+            j=pl.min_horizontal("file", before),
+            k=pl.max_horizontal("file", before),
+        )
+        .agg(
+            apart=(
+                pl.sum_horizontal(moved).sqrt() > _BLUR + _FASTEST * pl.col("dt")
+            ).any()
+        )
+        .sort("j", "k", "apart", *person)
     )
-    found = people.group_by("j", "k", maintain_order=True).agg(
-        (~pl.col("apart")).sum().alias("together"),
-        pl.col("apart").sum(),
-        pl.col("id").last(),
+    counts = people.group_by("j", "k", maintain_order=True).agg(
+        (~pl.col("apart")).sum().alias("together"), pl.sum("apart"), pl.last("id")
     )
-    return list(found.iter_rows())
+    return counts.rows()
 
 
 def name_recordings(files: Sequence[Path]) -> list[str]:
     """A name for each of `files`: without its ending, with its folder where two files have the same name."""
-    names = [file_stem(file) for file in files]
+    stems = [file_stem(file) for file in files]
     names = [
-        f"{file.parent.name}-{name}" if names.count(name) > 1 else name
-        for file, name in zip(files, names, strict=True)
+        f"{file.parent.name}-{name}" if stems.count(name) > 1 else name
+        for file, name in zip(files, stems, strict=True)
     ]
     return [
         f"{n} ({names[:k].count(n) + 1})" if n in names[:k] else n

@@ -10,11 +10,13 @@ import io
 import json
 import shutil
 import sqlite3
+import sys
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +34,11 @@ from ..core.files import temporary_folder
 from ..core.input_files import printable, readable_path, unchanged_files
 
 LONGEST_LINE = 100_000
-UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _BYTES = 6  # memory for each byte of a text while it is read (measured: 5.8 with its columns)
 _RESERVE = 0.02  # share of a disk that unpacking leaves free
-_ROWS_AT_ONCE = 4096  # rows of a table that are read before its size is checked
+# rows that are read before the size of all is checked, of a table and of a database
+_ROWS_AT_ONCE, _VALUES_AT_ONCE = 4096, 100
+CONTAINERS = {"PAR1": "Parquet", "ARROW1": "Feather"}  # by their first letters
 
 
 @dataclass(frozen=True)
@@ -61,12 +64,6 @@ class Source:
     decimal: str = "."
     head: str = ""
 
-    def ragged(self, height: int) -> pl.Series:
-        """Whether each of `height` rows has another number of fields than the header."""
-        if self.n_fields is None:
-            return pl.repeat(False, height, eager=True)
-        return (self.n_fields != len(self.names)).fill_null(True)
-
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[Path]:
@@ -76,14 +73,11 @@ def unpacked(path: Path) -> Iterator[Path]:
     StorageError where there is no room.
     """
     if not path.is_file():
-        what = "no such file"
-        if path.exists():
-            is_folder = path.is_dir()
-            what = (
-                "is a folder; pass the files in it"
-                if is_folder
-                else "is no regular file; only those are read"
-            )
+        what = "is no regular file; only those are read"
+        if path.is_dir():
+            what = "is a folder; pass the files in it"
+        elif not path.exists():
+            what = "no such file"
         raise DataError(f"{printable(path)}: {what}")
     if printable(path.name) != path.name:
         raise DataError(
@@ -102,8 +96,8 @@ def unpacked(path: Path) -> Iterator[Path]:
             yield folder / "unpacked"
 
 
-def _find_member(plain: Path, path: Path) -> str | None:
-    """The one file in a zip archive; None where it holds many texts, as Grand Central's."""
+def _find_member(plain: Path, path: Path) -> str:
+    """The one file in a zip archive."""
     try:
         with zipfile.ZipFile(plain) as archive:
             names = [each for each in archive.namelist() if not each.endswith("/")]
@@ -118,16 +112,12 @@ def _find_member(plain: Path, path: Path) -> str | None:
             f'pip install fastexcel; python -c "import polars; {command}"'
         )
     tracks = [name for name in names if not name.startswith("__MACOSX/")]
-    if len(tracks) == 1:
-        return tracks[0]
-    if tracks and all(
-        Path(name).stem.isdecimal() and name.endswith(".txt") for name in tracks
-    ):
-        return None
-    raise DataError(
-        f"{path}, line 1: is packed by zip and holds {len(tracks)} files; unpack it, and pass those that are "
-        f"tracks: unzip {path.name}"
-    )
+    if len(tracks) != 1:
+        raise DataError(
+            f"{path}, line 1: is packed by zip and holds {len(tracks)} files; unpack it, and pass those that "
+            f"are tracks: unzip {path.name}"
+        )
+    return tracks[0]
 
 
 def unpack(plain: Path, path: Path, target: Path, member: str | None = None) -> None:
@@ -135,29 +125,16 @@ def unpack(plain: Path, path: Path, target: Path, member: str | None = None) -> 
 
     Failure to read means damage, failure to write a lack of room.  The disk is never filled.
     """
+    kind = ".gz" if member is None else "zip"
+    damage = EOFError, zlib.error, gzip.BadGzipFile, zipfile.BadZipFile, RuntimeError
     try:
-        with closing(
-            gzip.open(plain) if member is None else zipfile.ZipFile(plain)
-        ) as archive:
-            source = (
-                archive.open(member or "")
-                if isinstance(archive, zipfile.ZipFile)
-                else archive
-            )
-            with source, target.open("wb") as unpacked:
-                while block := source.read(1 << 22):
-                    disk = shutil.disk_usage(target.parent)
-                    if disk.free < _RESERVE * disk.total:
-                        raise OSError(errno.ENOSPC, "the disk is nearly full")
-                    unpacked.write(block)
-    except (
-        EOFError,
-        zlib.error,
-        gzip.BadGzipFile,
-        zipfile.BadZipFile,
-        RuntimeError,
-    ) as error:
-        kind = ".gz" if member is None else "zip"
+        with _open_packed(plain, member) as packed, target.open("wb") as unpacked:
+            while block := packed.read(1 << 22):
+                disk = shutil.disk_usage(target.parent)
+                if disk.free < _RESERVE * disk.total:
+                    raise OSError(errno.ENOSPC, "the disk is nearly full")
+                unpacked.write(block)
+    except damage as error:
         raise DataError(
             f"{path}: damaged {kind} ({error}); fetch the file again"
         ) from error
@@ -168,30 +145,39 @@ def unpack(plain: Path, path: Path, target: Path, member: str | None = None) -> 
         ) from error
 
 
-def read_head(plain: Path) -> bytes:
-    """The first line of the unpacked file `plain`."""
+def _open_packed(plain: Path, member: str | None) -> Any:
+    if member is None:
+        return gzip.open(plain)
+    return zipfile.Path(plain, member).open("rb")
+
+
+def read_head(plain: Path) -> str:
+    """The first two lines of the unpacked file `plain`."""
     with plain.open("rb") as stream:
-        head = stream.readline(LONGEST_LINE)
-        if head.startswith(UTF_16):
-            text = (head + stream.read(4 * 4000)).decode("utf-16", errors="replace")
-            head = text.partition("\n")[0].encode()
-    return head.removeprefix(codecs.BOM_UTF8)
+        text = decode(stream.read(LONGEST_LINE))
+    return "\n".join(text.splitlines()[:2])
 
 
-def require_memory(size: float, where: str, factor: float = _BYTES) -> None:
-    """Raise MemoryLimitError where the text `where` of `size` bytes needs more memory than is allowed.
+def decode(content: bytes) -> str:
+    """The `content` of a file as text: UTF-16 with its mark, else UTF-8."""
+    is_wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return content.decode("utf-16" if is_wide else "utf-8-sig", errors="replace")
 
-    It needs `factor` bytes for each of its own.
+
+def require_memory(
+    size: float, where: str, what: str = "text", factor: float = _BYTES
+) -> None:
+    """Raise MemoryLimitError where `size` bytes of `where` need more memory than is allowed.
+
+    They need `factor` bytes each; `what` they are stands in the message.
     """
-    memory.require(factor * size, f"{where}: to read {size / 1e6:,.3g} MB of text")
+    memory.require(factor * size, f"{where}: to read {size / 1e6:,.3g} MB of {what}")
 
 
 def read_text(plain: Path, where: str) -> str:
     """The whole text of file `plain`, called `where` in messages."""
     require_memory(plain.stat().st_size, where)
-    content = plain.read_bytes()
-    encoding = "utf-16" if content.startswith(UTF_16) else "utf-8-sig"
-    return content.decode(encoding, errors="replace")
+    return decode(plain.read_bytes())
 
 
 # --- text ---------------------------------------------------------------------------------------------
@@ -217,8 +203,7 @@ def find_separator(first: str) -> str:
     return found if found in first else " "
 
 
-def is_number(text: str) -> bool:
-    """Whether `text` is a number."""
+def _is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:
@@ -231,7 +216,7 @@ def open_text(
     where: str,
     *,
     has_header: bool | None = None,
-    n_fields: int | None = None,
+    n_fields: int = 0,
     size: int | None = None,
 ) -> Source:
     """The text table `plain`, called `where`: each line is a row of `n_fields`, or as many as the first.
@@ -249,15 +234,14 @@ def open_text(
     separator = find_separator(first)
     names = split_line(first, separator)
     if has_header is None:
-        has_header = not all(map(is_number, names))
+        has_header = not all(map(_is_number, names))
     rows = lines.slice(int(has_header))
     if rows.str.contains('"', literal=True).any():
-        parts = pl.Series(
-            [split_line(row or "", separator) for row in rows], dtype=pl.List(pl.String)
-        )
+        fields = [split_line(row or "", separator) for row in rows]
+        parts = pl.Series(fields, dtype=pl.List(pl.String))
+    elif separator == " ":
+        parts = rows.str.replace_all(r"\s+", " ").str.strip_chars().str.split(" ")
     else:
-        if separator == " ":
-            rows = rows.str.replace_all(r"\s+", " ").str.strip_chars()
         parts = rows.str.split(separator)
     return Source(
         where,
@@ -278,12 +262,10 @@ def _read_lines(plain: Path, where: str, size: int | None) -> pl.Series:
         content = stream.read(size)
         if size is not None and stream.read(1):
             content = content[: content.rfind(b"\n") + 1]
-    if content.startswith(UTF_16):
-        content = content.decode("utf-16", errors="replace").encode()
-    content = content.removeprefix(codecs.BOM_UTF8).replace(b"\x1f", b"?")
     return pl.read_csv(
-        io.BytesIO(content), has_header=False, separator="\x1f", quote_char=None,
-        schema={"line": pl.String}, encoding="utf8-lossy", raise_if_empty=False,
+        io.BytesIO(decode(content).replace("\x1f", "?").encode()),
+        has_header=False, separator="\x1f", quote_char=None,
+        schema={"line": pl.String}, raise_if_empty=False,
     )["line"]  # fmt: skip
 
 
@@ -297,11 +279,8 @@ def open_frame(table: pl.DataFrame, where: str) -> Source:
 
 def is_table(source: object) -> bool:
     """Whether `source` is a table of pandas, Polars, Arrow, GeoPandas, MovingPandas or PedPy, and no path."""
-    names = ("__arrow_c_stream__", "to_point_gdf")
-    is_known = isinstance(source, pd.DataFrame) or any(
-        hasattr(source, name) for name in names
-    )
-    return is_known or (hasattr(source, "data") and hasattr(source, "frame_rate"))
+    names = "__arrow_c_stream__", "to_point_gdf", "frame_rate"
+    return any(hasattr(source, name) for name in names)
 
 
 def open_table(source: Any, where: str) -> Source:
@@ -344,25 +323,12 @@ def open_arrow(plain: Path, where: str, kind: str) -> Source:
 
     By pyarrow: a damaged file can make Polars abort the process.
     """
-    try:
-        is_parquet = kind == "Parquet"
-        schema = pq.read_schema(plain) if is_parquet else pa.ipc.open_file(plain).schema
-        data, names = pa.dataset.dataset(plain, schema, kind.lower()), schema.names
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise DataError(
-            f"{where}: damaged {kind} ({error}); fetch or write the file again"
-        ) from error
 
-    def column(k: int) -> pl.Series:
-        """A column of the file."""
+    @contextmanager
+    def explained() -> Iterator[None]:
+        """Raise what pyarrow raises as DataError."""
         try:
-            batches = data.to_batches(columns=[names[k]], batch_size=_ROWS_AT_ONCE)
-            table = pa.Table.from_batches(
-                _bounded(batches, where), schema=pa.schema([data.schema.field(k)])
-            )
-            table.validate(full=True)
-            # without metadata
-            return pl.DataFrame(pa.table({"c": table[0]})).to_series()
+            yield
         except DataError:
             raise
         except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
@@ -370,17 +336,32 @@ def open_arrow(plain: Path, where: str, kind: str) -> Source:
                 f"{where}: damaged {kind} ({error}); fetch or write the file again"
             ) from error
 
+    with explained():
+        is_parquet = kind == "Parquet"
+        schema = pq.read_schema(plain) if is_parquet else pa.ipc.open_file(plain).schema
+        data, names = pa.dataset.dataset(plain, schema, kind.lower()), schema.names
+
+    def column(k: int) -> pl.Series:
+        """A column of the file."""
+        with explained():
+            batches = data.to_batches(columns=[names[k]], batch_size=_ROWS_AT_ONCE)
+            charged = _charged(batches, lambda batch: int(batch.nbytes), where)
+            table = pa.Table.from_batches(charged, pa.schema([schema.field(k)]))
+            table.validate(full=True)
+            # without metadata
+            return pl.DataFrame(pa.table({"c": table[0]})).to_series()
+
     return Source(where, tuple(names), column)
 
 
-def _bounded(batches: Iterable[Any], where: str) -> Iterator[Any]:
-    """The batches of a column, as long as memory is allowed for all of them."""
+def _charged(
+    batches: Iterable[Any], measure: Callable[[Any], int], where: str
+) -> Iterator[Any]:
+    """The batches of a column, as long as memory is allowed for all of them; `measure` gives their bytes."""
     size = 0
     for batch in batches:
-        size += batch.nbytes
-        memory.require(
-            _BYTES * size, f"{where}: to read {size / 1e6:,.3g} MB of a column"
-        )
+        size += measure(batch)
+        require_memory(size, where, "a column")
         yield batch
 
 
@@ -392,26 +373,24 @@ def open_json(content: str, where: str) -> Source:
         elif '"FeatureCollection"' in content[:1000]:
             rows = [
                 each["properties"]
-                | dict(zip(("x", "y"), each["geometry"]["coordinates"], strict=False))
+                | dict(zip("xy", each["geometry"]["coordinates"], strict=False))
                 for each in json.loads(content)["features"]
             ]
         else:
             rows = [json.loads(line) for line in content.splitlines() if line.strip()]
         names = list(dict.fromkeys(name for row in rows for name in row))
-        texts = {
-            name: [
-                None if (value := row.get(name)) is None else str(value) for row in rows
-            ]
-            for name in names
-        }
+        texts = {name: _as_text(row.get(name) for row in rows) for name in names}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         expected = "an object a line, a list of objects, or GeoJSON of points"
         raise DataError(
             f"{where}, line 1: cannot be read as JSON ({error}); expected {expected}"
         ) from error
-    return open_frame(
-        pl.DataFrame(texts, schema=dict.fromkeys(names, pl.String)), where
-    )
+    return open_frame(pl.DataFrame(texts), where)
+
+
+def _as_text(values: Iterable[Any]) -> pl.Series:
+    texts = [None if value is None else str(value) for value in values]
+    return pl.Series(texts, dtype=pl.String)
 
 
 # --- databases ----------------------------------------------------------------------------------------
@@ -428,43 +407,33 @@ def open_database(plain: Path, path: Path) -> list[Source]:
             f"{path}: {journal.name} holds changes that are not in the file yet; close the program that "
             f"writes it, or run: sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
         )
+
+    address = f"{plain.absolute().as_uri()}?mode=ro&immutable=1"
+
+    def size_of(rows: list[Any]) -> int:
+        """Bytes of all values in some rows."""
+        return sum(map(sys.getsizeof, chain.from_iterable(rows)))
+
+    def query(text: str) -> Iterator[Any]:
+        """The rows that a query gives, as long as memory is allowed for all of them."""
+        with closing(sqlite3.connect(address, uri=True)) as file:
+            found = file.execute(text)
+            some = iter(lambda: found.fetchmany(_VALUES_AT_ONCE), [])
+            yield from chain.from_iterable(_charged(some, size_of, f"{path}"))
+
+    def open_one(table: str) -> Source:
+        """One of the tables."""
+        names = [row[1] for row in query(f'PRAGMA table_xinfo("{table}")')]
+
+        def column(k: int) -> pl.Series:
+            """A column of the table, as text."""
+            rows = query(f'SELECT "{names[k]}" FROM "{table}"')
+            return _as_text(value for (value,) in rows)
+
+        return Source(f"{path}", tuple(names), column)
+
     try:
-        names = [
-            name
-            for (name,) in _query(
-                plain, "SELECT name FROM sqlite_master WHERE type = 'table'"
-            )
-        ]
-        return [_open_database_table(plain, path, name) for name in names]
+        tables = query("SELECT name FROM sqlite_master WHERE type = 'table'")
+        return [open_one(name) for (name,) in tables]
     except sqlite3.DatabaseError:
         return []
-
-
-def _open_database_table(plain: Path, path: Path, table: str) -> Source:
-    columns = [row[1] for row in _query(plain, f'PRAGMA table_xinfo("{table}")')]
-
-    def column(k: int) -> pl.Series:
-        """A column of the table, as it is or, where types are mixed, as text."""
-        values, size = [], 0
-        for (value,) in _query(plain, f'SELECT "{columns[k]}" FROM "{table}"'):
-            size += len(value) if isinstance(value, str | bytes) else 8
-            values.append(value)
-            if len(values) % _ROWS_AT_ONCE == 0 or size > _LARGE_VALUE:
-                memory.require(
-                    _BYTES * size, f"{path}: to read {size / 1e6:,.3g} MB of a column"
-                )
-        if len({type(value) for value in values} - {type(None)}) > 1:
-            values = [None if value is None else str(value) for value in values]
-        return pl.Series(values)
-
-    return Source(f"{path}", tuple(columns), column)
-
-
-_LARGE_VALUE = 1 << 20
-
-
-def _query(plain: Path, text: str) -> Iterator[Sequence[Any]]:
-    with closing(
-        sqlite3.connect(f"{plain.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
-    ) as file:
-        yield from file.execute(text)

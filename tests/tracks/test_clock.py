@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import szlib
-from szlib.tracks import clock, funnels
+from szlib.tracks import funnels
 from szlib.tracks.clock import COLUMNS, clock_index, to_clock
 
 BEGIN = 1_351_040_400.0
@@ -246,16 +246,6 @@ def test_row_order_and_ids_do_not_matter(seed: int) -> None:
         ["day", "id", "t"], ignore_index=True
     )
     pd.testing.assert_frame_equal(back, tracks)
-
-
-def test_the_size_of_a_block_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
-    raw = pd.concat(
-        [walkers(seed).assign(day=f"2012-10-{24 + seed}") for seed in range(3)]
-    )
-    whole = to_clock(raw)
-    for rows in (1, 97):
-        monkeypatch.setattr(clock, "_ROWS_AT_ONCE", rows)
-        pd.testing.assert_frame_equal(to_clock(raw), whole, check_exact=True)
 
 
 def test_the_same_id_on_two_days_is_two_people() -> None:
