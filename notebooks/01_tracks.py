@@ -73,17 +73,7 @@ square = record.cache.find_area(people)
 inside = square.contains(people["x"], people["y"])
 speed = np.hypot(people["vx"], people["vy"])
 walking = speed[speed > 0.4]
-fig, (ax, right) = plt.subplots(1, 2, figsize=(10.5, 3.1), layout="constrained", width_ratios=(1.6, 1))
-plots.plot_map(people, square, ax=ax)
-ax.set_title(f"{inside.mean():.0%} of the time people are in the area (red)")
-ax.get_legend().remove()
-right.hist(
-    speed, bins=np.arange(0, 2.55, 0.1).tolist(), weights=np.full(len(speed), 1 / 36_000), color=figures.BLUE
-)
-right.axvline(walking.median(), color=figures.RED, linestyle="--")
-right.set(
-    xlabel="speed [m/s]", ylabel="person-hours", title=f"People who walk: {walking.median():.2f} m/s (median)"
-)
+fig = plots.draw_map_and_speeds(people, square, share=inside.mean(), median=walking.median())
 record.figure(fig, "map")
 
 # %% jupyter={"source_hidden": true}

@@ -1,11 +1,11 @@
 """Figures of the notebooks; those that szlib itself draws are in `szlib.workbook.figures`.
 
 comparisons  many runs or fits: sweeps, strategies, intervals, claims, sites (notebooks 06, 21, 23, 25, 27, 29)
-control      a distance, a step, and its ways (notebooks 07, 12, the laboratory)
-encounters   paths, an encounter in motion, where the other person is (notebook 02)
+control      a distance, a plan, a step, and its ways (notebooks 07, 08, 12, the laboratory)
+encounters   paths, and where the other person is (notebook 02)
 simulation   paths of several runs, crowds (notebooks 09, 12, 26, 29)
 tracks       where people walked, speeds, and the rows that each stage keeps (notebooks 01, 24)
-zones        outliers, the hull (notebooks 03, 04)
+zones        outliers, the hull, the reach by direction (notebooks 03, 04, 05)
 """
 
 from .comparisons import (
@@ -20,12 +20,12 @@ from .comparisons import (
 )
 from .control import plot_distance, plot_step, plot_ways
 from .encounters import (
-    animate_encounter,
+    draw_space_and_paths,
     plot_distance_by_direction,
     plot_encounter_paths,
     plot_relative_positions,
     reference_frame,
 )
 from .simulation import plot_crowd, plot_robot_paths
-from .tracks import plot_funnel, plot_map, plot_speed_histogram
-from .zones import plot_hull, plot_outliers
+from .tracks import draw_map_and_speeds, plot_funnel, plot_map, plot_speed_histogram
+from .zones import draw_hull_and_zones, draw_outliers, draw_zone_and_reach, plot_hull

@@ -1,21 +1,17 @@
-"""Figures of encounters: paths, a recorded encounter in motion, where the other person is (notebook 02)."""
+"""Figures of encounters: paths, and where the other person is (notebook 02)."""
 
 from __future__ import annotations
 
-import io
-
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
-from PIL import Image
+from matplotlib.patches import Circle, Rectangle
 
 from szlib.core.checks import check_columns, check_rows
-from szlib.core.errors import DataError
 from szlib.encounters.samples import SAMPLE_COLUMNS
 from szlib.tracks.clock import COLUMNS, nearest_tick
 from szlib.workbook.figures.style import (
@@ -30,19 +26,6 @@ from szlib.workbook.figures.style import (
     get_axes,
     label_metres,
 )
-from szlib.zones.ellipses import Ellipse
-
-_HALF_TICK = 0.05  # half a step of the clock of tracks [s]
-
-
-_REFERENCE = "reference pedestrian"
-
-
-_PEOPLE = {
-    _REFERENCE: ORANGE,
-    "other person": BLUE,
-}  # colours of the two people of an encounter
-
 
 _N_BINS = 40  # cells across r_max, or twice r_max: 5 or 10 cm for the paper's 2 m
 
@@ -175,96 +158,40 @@ def plot_encounter_paths(paths: pd.DataFrame, *, n_shown: int = 200, ax: Axes | 
     )
 
 
-def animate_encounter(
-    tracks: pd.DataFrame,
-    samples: pd.DataFrame,
-    encounter: int | None = None,
-    *,
-    zone: Ellipse | None = None,
-    margin: float = 2.0,
-    every: float = 0.2,
-    width: float = 5.5,
-) -> bytes:
-    """Animate a recorded encounter: both people's real paths, in the time in which they walked.
+def draw_space_and_paths(paths: pd.DataFrame, *, n_shown: int = 25) -> Figure:
+    """Draw the paper's attentional space with a person at 45 deg, beside the paths of encounters.
 
     Parameters
     ----------
-    tracks : the track table in which the encounters were found.
-    samples : table as from `szlib.find_encounters`.
-    encounter : its number; None: the one whose nearest approach is the median.
-    zone : a zone in the person's frame, to be drawn around the reference pedestrian.
-    margin : time before and after the encounter that is shown as well [s].
-    every : time between two frames [s].
-    width : width of the picture [inch].
-
-    Returns
-    -------
-    An animated GIF, which a browser, `IPython.display.Image` or `NotebookRecord.animation` shows.
-
-    Raises
-    ------
-    DataError : there is no such encounter, or its people are not in the tracks.
+    paths : table as from `reference_frame`.
+    n_shown : largest number of encounters to draw.
 
     Examples
     --------
-    >>> import szlib
+    >>> import numpy as np, pandas as pd
     >>> import plots
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
-    >>> tracks = szlib.read_tracks(plaza)
-    >>> gif = plots.animate_encounter(tracks, szlib.find_encounters(tracks), every=1.0)
-    >>> gif[:6]
-    b'GIF89a'
+    >>> t = np.arange(31) / 10
+    >>> paths = pd.DataFrame({"encounter": 0, "t": t, "ref_x": t, "ref_y": 0.0, "other_x": 5 - t})
+    >>> figure = plots.draw_space_and_paths(paths.assign(other_y=1.0))
+    >>> figure.axes[1].get_title()
+    '1 of 1 encounters'
     """
-    nearest = samples.groupby("encounter")["distance"].min().sort_values()
-    number = nearest.index[len(nearest) // 2] if encounter is None and len(nearest) else encounter
-    shown = samples[samples["encounter"] == number]
-    if shown.empty:
-        raise DataError(f"encounter {number!r} is not among the {len(nearest)} encounters of the samples")
-    begin, end, day = shown["t"].min(), shown["t"].max(), str(shown["day"].iloc[0])
-    rows = tracks[(tracks["day"].astype(str) == day) & tracks["t"].between(begin - margin, end + margin)]
-    paths = [rows[rows["id"] == shown[name].iloc[0]].sort_values("t") for name in ("ref_id", "other_id")]
-    if paths[0].empty or paths[1].empty:
-        raise DataError(f"encounter {number!r}: its people are not in these tracks on the day {day}")
-    figure = Figure(figsize=(width, width), layout="constrained", dpi=80)
-    canvas, ax, frames = FigureCanvasAgg(figure), figure.subplots(), []
-    both = pd.concat(paths)[["x", "y"]].to_numpy()
-    low, high = both.min(0), both.max(0)
-    box = np.transpose([(low + high) / 2 + side * ((high - low).max() / 2 + 1) for side in (-1, 1)])
-    for t in np.arange(begin - margin, end + margin + every / 2, every).tolist():
-        ax.clear()
-        ax.set(xlim=box[0], ylim=box[1])
-        pasts = [path[path["t"] <= t + _HALF_TICK] for path in paths]
-        here = {}
-        for path, past, (name, colour) in zip(paths, pasts, _PEOPLE.items(), strict=True):
-            ax.plot(path["x"], path["y"], color=colour, alpha=0.25)
-            ax.plot(past["x"], past["y"], color=colour, linewidth=2, label=name)
-            if len(past) and t <= path["t"].iloc[-1] + _HALF_TICK:  # here now
-                x, y, vx, vy = past[["x", "y", "vx", "vy"]].iloc[-1]
-                here[name] = x, y, np.arctan2(vy, vx)
-                draw_person(ax, *here[name], color=colour, markersize=11)
-        if zone is not None and (pose := here.get(_REFERENCE)):
-            ax.plot(*zone.placed(pose[:2], pose[2]).curve().T, color=GREY, label="zone")
-        add_legend_below(ax, ncols=3)
-        apart = ""
-        if len(here) == 2:
-            (x, y, _), (other_x, other_y, _) = here.values()
-            apart = f", {np.hypot(x - other_x, y - other_y):.2f} m apart"
-        phase = "encounter" if begin <= t <= end else "before" if t < begin else "after"
-        label_metres(ax, f"Encounter {number}, {t - begin:+.1f} s ({phase}){apart}")
-        canvas.draw()  # type: ignore[no-untyped-call]
-        figure.set_layout_engine("none")  # that of the first frame stays
-        pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-        frames.append(Image.fromarray(pixels).convert("RGB").quantize(method=Image.Quantize.FASTOCTREE))
-    gif = io.BytesIO()
-    frames[0].save(
-        gif,
-        "GIF",
-        save_all=True,
-        append_images=frames[1:],
-        duration=1000 * every,
-        loop=0,
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(10.5, 3.8), layout="constrained", width_ratios=(1, 1.25)
     )
-    return gif.getvalue()
+    left.add_patch(Rectangle((0, -2), 5, 4, color=BLUE, alpha=0.2, label="attentional space"))
+    left.plot(0, 0, marker=(3, 0, -90), color=ORANGE, ms=14, ls="", label="reference pedestrian")
+    left.plot(1, 1, "o", color=BLUE, ms=9, label="other person")
+    left.plot([0, 1], [0, 1], ":", color=BLACK)
+    left.annotate("1.41 m, at 45°", (1.15, 1.15))
+    left.set(xlim=(-0.7, 5.4), ylim=(-2.3, 3.9))
+    label_metres(left, "Seen at 45°: ahead, to the left", person=True)
+    left.legend(loc="upper right", fontsize=8)
+    plot_encounter_paths(paths, n_shown=n_shown, ax=right)
+    n_paths = paths["encounter"].nunique()
+    right.set_title(f"{min(n_shown, n_paths)} of {n_paths:,} encounters")
+    right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    return figure
 
 
 def plot_relative_positions(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
@@ -125,6 +127,41 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
         margin = 0.02 * (high - low)
         ax.set(**{f"{axis}lim": (low - margin, high + margin)})
     return label_metres(ax, "Where people walked, and the area")
+
+
+def draw_map_and_speeds(tracks: pd.DataFrame, area: Area, *, share: float, median: float) -> Figure:
+    """Draw where people walked, beside how fast they were.
+
+    Parameters
+    ----------
+    tracks : table as from `szlib.read_tracks`.
+    area : area in which encounters are counted.
+    share : share of the time that people are in the area.
+    median : speed of people who walk [m/s].
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd, szlib
+    >>> import plots
+    >>> t = np.arange(50) / 10
+    >>> tracks = pd.DataFrame({"day": "d", "id": 1, "t": t, "x": t - 13, "y": 0 * t, "vx": 1.0, "vy": 0.0})
+    >>> figure = plots.draw_map_and_speeds(tracks, szlib.ATC_SQUARE, share=0.5, median=1.0)
+    >>> [ax.get_title() for ax in figure.axes[:2]]
+    ['50% of the time people are in the area (red)', 'People who walk: 1.00 m/s (median)']
+    """
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(10.5, 3.1), layout="constrained", width_ratios=(1.6, 1)
+    )
+    plot_map(tracks, area, ax=left)
+    left.set_title(f"{share:.0%} of the time people are in the area (red)")
+    left.get_legend().remove()
+    speed = np.hypot(tracks["vx"], tracks["vy"])
+    hours = np.full(len(speed), 1 / 36_000)  # a sample is 0.1 s
+    right.hist(speed, bins=np.arange(0, 2.55, 0.1).tolist(), weights=hours, color=BLUE)
+    right.axvline(median, color=RED, linestyle="--")
+    right.set(xlabel="speed [m/s]", ylabel="person-hours")
+    right.set_title(f"People who walk: {median:.2f} m/s (median)")
+    return figure
 
 
 def _outline_area(area: Area, **style: Any) -> PathPatch:

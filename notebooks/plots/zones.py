@@ -1,4 +1,4 @@
-"""Figures of zones: outliers, the hull and its slices (notebooks 03, 04)."""
+"""Figures of zones: outliers, the hull and its slices, the reach by direction (notebooks 03 to 05)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import Circle
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import ConvexHull
@@ -19,71 +20,45 @@ from szlib.workbook.figures.style import (
     BLACK,
     BLUE,
     GREY,
+    ORANGE,
     RED,
-    add_legend_below,
-    get_axes,
     label_metres,
     pick_colours,
 )
+from szlib.zones.ellipses import Ellipse
 from szlib.zones.hulls import HullZone
 from szlib.zones.social_zone import SocialZone
 
+# Lines of slices and of zones, by speed.
+LINES = ("-", "--", ":", "-.")
 
-def plot_outliers(
-    points: np.ndarray,
-    outlier: np.ndarray,
-    *,
-    r_max: float = 2.0,
-    ax: Axes | None = None,
-) -> Axes:
-    """Plot inliers and outliers in complementary coordinates (paper, fig. 4a).
+
+def draw_outliers(plain: np.ndarray, points: np.ndarray, outlier: np.ndarray) -> Figure:
+    """Draw samples and outliers around a person, beside the same in complementary coordinates (paper, fig. 4a).
 
     Parameters
     ----------
+    plain : positions in the person's frame, shape (n, 2) [m].
     points : complementary coordinates (x', y'), shape (n, 2) [m].
     outlier : True for each outlier, shape (n,).
-    r_max : largest distance of a sample [m].
-    ax : axes to draw on; None makes new ones.
 
     Examples
     --------
     >>> import numpy as np
     >>> import plots
     >>> points = np.random.default_rng(0).normal(0, 0.5, (50, 2))
-    >>> ax = plots.plot_outliers(points, np.arange(50) < 2)
+    >>> figure = plots.draw_outliers(points, points, np.arange(50) < 2)
+    >>> figure.axes[1].get_title()
+    'Turned inside out: the 2 most alone (x)'
     """
-    ax, inliers = get_axes(ax, size=(6, 5)), points[~outlier]
-    ax.plot(
-        *inliers.T,
-        ".",
-        color=GREY,
-        markersize=2,
-        rasterized=True,
-        label=f"{len(inliers):,} inliers",
-    )
-    ax.plot(
-        *points[outlier].T,
-        "x",
-        color=RED,
-        markersize=7,
-        mew=1.8,
-        label=f"{outlier.sum():,} outliers",
-    )
-    ax.add_patch(
-        Circle(
-            (0, 0),
-            r_max,
-            fill=False,
-            linestyle=":",
-            color=BLACK,
-            label="contact, r = 0",
-        )
-    )
-    ax.set(xlim=(-1.05 * r_max, 1.05 * r_max), ylim=(-1.05 * r_max, 1.05 * r_max))
-    add_legend_below(ax, ncols=3)
-    label_metres(ax, "The nearer a person, the farther from the centre")
-    ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
-    return ax
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.5), layout="constrained")
+    for ax, each in ((left, plain), (right, points)):
+        ax.plot(*each[~outlier].T, ".", color=GREY, markersize=1.5, rasterized=True)
+        ax.plot(*each[outlier].T, "x", color=RED, markersize=6, mew=1.4)
+    label_metres(left, f"{len(plain):,} samples around a person", person=True)
+    label_metres(right, f"Turned inside out: the {outlier.sum()} most alone (x)")
+    right.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
+    return figure
 
 
 def plot_hull(
@@ -132,7 +107,7 @@ def plot_hull(
             alpha=0.35,
             label=f"{len(shown):,} of the samples",
         )
-    for speed, colour, line in zip(speeds, pick_colours(speeds), cycle(("-", "--", ":", "-.")), strict=False):
+    for speed, colour, line in zip(speeds, pick_colours(speeds), cycle(LINES), strict=False):
         corners = zone.shape.slice(speed).polygon
         closed = np.vstack([corners, corners[:1]])
         level = np.full(len(closed), speed)
@@ -160,3 +135,78 @@ def plot_hull(
     ax.legend(loc="upper left", fontsize=8)
     ax.view_init(elev=18, azim=-60)
     return ax
+
+
+def draw_hull_and_zones(zone: SocialZone, points: np.ndarray) -> Figure:
+    """Draw the hull with its slices, beside the zones that they leave free.
+
+    Parameters
+    ----------
+    zone : a zone of method "hull" or "paper"; its slices are at the speeds of its ellipses.
+    points : samples (x', y', speed), shape (n, 3) [m, m/s].
+    """
+    speeds = list(zone.ellipses)
+    room = ConstrainedLayoutEngine(wspace=0.08)  # for the label of the speed
+    figure = plt.figure(figsize=(11, 4.1), layout=room)
+    left: Any = figure.add_subplot(1, 2, 1, projection="3d")
+    right = figure.add_subplot(1, 2, 2)
+    plot_hull(zone, speeds, points=points, ax=left)
+    is_four = len(speeds) == 4
+    left.set_title("One hull around all samples, cut at four speeds" if is_four else "Hull and slices")
+    left.legend().remove()
+    left.set_yticks((-1, 0, 1))
+    left.set_box_aspect(None, zoom=1.25)
+    for speed, colour, line in zip(speeds, pick_colours(speeds), cycle(LINES), strict=False):
+        boundary = zone.boundary(speed)
+        right.plot(*boundary.T, line, color=colour, linewidth=2, label=f"{speed:g} m/s")
+    right.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
+    right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    label_metres(right, "What each cut leaves free: the zone at that speed", person=True)
+    return figure
+
+
+def draw_zone_and_reach(zone: Ellipse, truth: Ellipse | None, bands: pd.DataFrame, speed: float) -> Figure:
+    """Draw the quantile zone at a speed, beside its reach in each direction with the 95 % interval.
+
+    Parameters
+    ----------
+    zone : the quantile zone.
+    truth : the zone that people keep, if it is known.
+    bands : direction [rad] and both ends of the interval, low and high [m], as of `SocialZone.uncertainty`.
+    speed : walking speed [m/s].
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd, szlib
+    >>> import plots
+    >>> zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+    >>> bands = pd.DataFrame({"direction": np.linspace(-3, 3, 9), "low": 0.6, "high": 0.9})
+    >>> figure = plots.draw_zone_and_reach(zone, None, bands, 1.1)
+    >>> figure.axes[1].get_title()
+    'The same, unrolled: the interval is 30 to 30 cm wide'
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 3.7), layout="constrained", width_ratios=(1, 1.5))
+    degrees = np.degrees(bands["direction"].to_numpy())
+    left.plot(*zone.curve().T, color=BLUE, linewidth=2, label="quantile zone")
+    right.plot(degrees, _measure_reach(zone, degrees), color=BLUE, linewidth=2, label="quantile zone")
+    if truth is not None:
+        reach = _measure_reach(truth, degrees)
+        name = "zone that people keep (truth)"
+        left.plot(*truth.curve().T, ":", color=RED, linewidth=2)
+        right.plot(degrees, reach, ":", color=RED, linewidth=2, label=name)
+    name = "95 % interval of the quantile zone"
+    right.fill_between(degrees, bands["low"], bands["high"], color=ORANGE, alpha=0.5, label=name)
+    left.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
+    label_metres(left, f"Where 5 % come nearer, at {speed:g} m/s", person=True)
+    right.set(xlabel="direction [deg] (0 is ahead, 90 left)", ylabel="reach of the zone [m]")
+    right.set_xticks(range(-180, 181, 90))
+    widths = 100 * (bands["high"] - bands["low"])
+    right.set_title(f"The same, unrolled: the interval is {widths.min():.0f} to {widths.max():.0f} cm wide")
+    right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return figure
+
+
+def _measure_reach(zone: Ellipse, degrees: np.ndarray) -> np.ndarray:
+    """Distance from the person to the outline of a `zone` in each direction [m]."""
+    x, y = zone.curve(2000).T
+    return np.asarray(np.interp(degrees, np.degrees(np.arctan2(y, x)), np.hypot(x, y), period=360))

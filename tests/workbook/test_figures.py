@@ -1,9 +1,10 @@
 """Figures: every one labels its axes with units, keeps metres square, and leaves its input alone."""
 
+import doctest
+import importlib
 import inspect
 import io
 import re
-from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -145,9 +146,9 @@ MAPS = {
     "map": lambda f: plots.plot_map(f("tracks"), szlib.ATC_SQUARE),
     "paths": lambda f: plots.plot_encounter_paths(paths(), n_shown=3),
     "los": lambda f: plots.plot_relative_positions(f("samples")),
-    "outliers": lambda f: plots.plot_outliers(
-        np.eye(2).repeat(3, axis=0), np.arange(6) < 1
-    ),
+    "outliers": lambda f: plots.draw_outliers(
+        np.eye(2), np.eye(2), np.arange(2) < 1
+    ).axes[1],
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
     "zones": lambda f: figures.plot_zones(f("zone")),
     "ellipse": lambda f: plots.plot_distance(ZONE),
@@ -231,6 +232,35 @@ def test_graphs_name_units(name, request):
     assert "[" in ax.get_xlabel() + ax.get_ylabel()
     assert ax.get_title()
     ax.figure.savefig(io.BytesIO())
+
+
+@pytest.mark.parametrize(
+    "name", sorted(file.stem for file in Path(plots.__file__).parent.glob("[a-z]*.py"))
+)
+def test_examples_of_the_figures_of_notebooks_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    module = importlib.import_module(f"plots.{name}")
+    assert doctest.testmod(module).failed == 0
+
+
+def test_the_hull_stands_beside_the_zones_that_it_leaves_free(zone):
+    points = np.array([[0.1, 0.2, 0.9], [-0.3, 0.1, 1.1]])
+    _, right = plots.draw_hull_and_zones(zone, points).axes
+    assert in_metres(right)
+    for line, speed in zip(right.lines, zone.ellipses, strict=False):
+        assert np.array_equal(line.get_xydata(), zone.boundary(speed))
+
+
+def test_the_reach_of_a_zone_is_its_outline_in_each_direction():
+    bands = pd.DataFrame(
+        {"direction": [-np.pi / 2, 0.0, np.pi / 2], "low": 0.6, "high": 0.9}
+    )
+    _, right = plots.draw_zone_and_reach(
+        ZONE, szlib.Ellipse((0, 0), (1, 1)), bands, 1.1
+    ).axes
+    reach, truth = (line.get_ydata() for line in right.lines)
+    assert reach == pytest.approx([0.697, 1.1, 0.697], abs=2e-3)
+    assert truth == pytest.approx([1, 1, 1], abs=1e-5)
 
 
 def test_given_axes_are_drawn_on(zone):
@@ -502,34 +532,3 @@ def test_safety_violations_are_shares_of_the_steps_claimed_safe():
         for bar in bars
     ]
     assert sorted(widths)[-2:] == [2, 3]
-
-
-def test_recorded_encounter_is_animated_in_real_time(tmp_path: Path) -> None:
-    plaza = szlib.make_plaza(
-        tmp_path / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=20)
-    )
-    tracks = szlib.read_tracks(plaza)
-    samples = szlib.find_encounters(tracks)
-    number = int(samples["encounter"].iloc[-1])
-    seconds = np.ptp(samples.loc[samples["encounter"] == number, "t"])
-    options = {"margin": 0.5, "every": 0.5, "width": 5.0}
-    gif = plots.animate_encounter(tracks, samples, number, **options)
-    movie = Image.open(io.BytesIO(gif))
-    assert movie.n_frames == round((seconds + 1.0) / 0.5) + 1
-    frames = []
-    for k in range(movie.n_frames):
-        movie.seek(k)
-        assert movie.info["duration"] == 500
-        frames.append(np.asarray(movie.convert("RGB"), int))
-    assert all((np.abs(now - before) > 60).any() for before, now in pairwise(frames)), (
-        "people move"
-    )
-    assert gif != plots.animate_encounter(
-        tracks, samples, number, zone=szlib.Ellipse((0, 0), (1, 1)), **options
-    )
-    with pytest.raises(
-        szlib.DataError, match=r"encounter -1 is not among the \d+ encounters"
-    ):
-        plots.animate_encounter(tracks, samples, -1)
-    with pytest.raises(szlib.DataError, match="its people are not in these tracks"):
-        plots.animate_encounter(tracks.head(0), samples, number)
