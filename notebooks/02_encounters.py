@@ -57,7 +57,6 @@ import numpy as np
 import pandas as pd
 import plots
 from IPython.display import Markdown
-from matplotlib.patches import Rectangle
 from studies import real_day
 
 import szlib
@@ -73,20 +72,7 @@ tracks = record.cache.tracks()
 square = record.cache.find_area(tracks)
 samples = record.cache.store_encounters(szlib.find_encounters(tracks, square=square, settings=conditions))
 count = samples["encounter"].nunique()
-fig, (left, right) = plt.subplots(1, 2, figsize=(10.5, 3.8), layout="constrained", width_ratios=(1, 1.25))
-left.add_patch(Rectangle((0, -2), 5, 4, color=figures.BLUE, alpha=0.2, label="attentional space"))
-left.plot(0, 0, marker=(3, 0, -90), color=figures.ORANGE, ms=14, ls="", label="reference pedestrian")
-left.plot(1, 1, "o", color=figures.BLUE, ms=9, label="other person")
-left.plot([0, 1], [0, 1], ":", color=figures.BLACK)
-left.annotate("1.41 m, at 45°", (1.15, 1.15))
-left.set(xlim=(-0.7, 5.4), ylim=(-2.3, 3.9))
-figures.label_metres(left, "Seen at 45°: ahead, to the left", person=True).legend(
-    loc="upper right", fontsize=8
-)
-paths = plots.reference_frame(tracks, samples)
-plots.plot_encounter_paths(paths, n_shown=examples, ax=right)
-right.set_title(f"{min(examples, count)} of {count:,} encounters")
-right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+fig = plots.draw_space_and_paths(plots.reference_frame(tracks, samples), n_shown=examples)
 record.figure(fig, "paths")
 
 # %% jupyter={"source_hidden": true}
