@@ -51,6 +51,7 @@ intruders = 0.01  # share of slow intruders on the plaza that puts the rules to 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from sklearn.neighbors import LocalOutlierFactor
 from studies import plaza_truth, pooled_plazas, real_day
@@ -69,14 +70,7 @@ outlier = outliers.is_outlier(close, fraction=fraction, r_max=r_max)
 los, r = close["los_angle"].to_numpy(), close["distance"].to_numpy()
 plain = np.column_stack([r * np.cos(los), r * np.sin(los)])
 points = outliers.complementary_points(close, r_max=r_max)
-fig, (left, right) = plt.subplots(1, 2, figsize=(10, 3.5), layout="constrained")
-for ax, each in ((left, plain), (right, points)):
-    ax.plot(*each[~outlier].T, ".", color=figures.GREY, markersize=1.5, rasterized=True)
-    ax.plot(*each[outlier].T, "x", color=figures.RED, markersize=6, mew=1.4)
-figures.label_metres(left, f"{len(close):,} samples around a person", person=True)
-figures.label_metres(right, f"Turned inside out: the {outlier.sum()} most alone (x)")
-right.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
-record.figure(fig, "outliers")
+record.figure(plots.draw_outliers(plain, points, outlier), "outliers")
 
 # %% jupyter={"source_hidden": true}
 # Parameters, with sources
