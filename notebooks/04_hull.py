@@ -75,25 +75,7 @@ inliers = szlib.remove_outliers(samples, r_max=r_max, **paper_rule)
 fit = {"r_max": r_max, "speeds": sorted({*speeds, zone_speed}), "n_resamples": 0}
 zone = szlib.SocialZone.fit(samples, method="paper", **fit)
 points = np.column_stack([outliers.complementary_points(inliers, r_max=r_max), inliers["speed"]])
-fig = plt.figure(figsize=(11, 4.1), layout="constrained")
-fig.get_layout_engine().set(wspace=0.08)  # room for the label of the speed
-left, right = fig.add_subplot(1, 2, 1, projection="3d"), fig.add_subplot(1, 2, 2)
-plots.plot_hull(zone, list(zone.ellipses), points=points, ax=left)
-left.set_title(
-    "One hull around all samples, cut at four speeds" if len(zone.ellipses) == 4 else "Hull and slices"
-)
-left.legend().remove()
-left.set_yticks((-1, 0, 1))
-left.set_box_aspect(None, zoom=1.25)
-lines = zip(
-    zone.ellipses, figures.pick_colours(list(zone.ellipses)), ("-", "--", ":", "-.") * 9, strict=False
-)
-for v, colour, line in lines:
-    right.plot(*zone.boundary(v).T, line, color=colour, linewidth=2, label=f"{v:g} m/s")
-right.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
-right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
-figures.label_metres(right, "What each cut leaves free: the zone at that speed", person=True)
-record.figure(fig, "hull")
+record.figure(plots.draw_hull_and_zones(zone, points), "hull")
 
 # %% jupyter={"source_hidden": true}
 # Parameters, with sources
