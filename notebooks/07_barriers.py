@@ -62,7 +62,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import plots
 from IPython.display import Markdown
-from matplotlib.patches import Circle
 from studies.lesson_zones import choose_zone
 
 import szlib
@@ -73,26 +72,7 @@ from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters
 record = NotebookRecord("07_barriers", globals(), plaza_zone=True)
 settings = szlib.MPCSettings(gamma=gamma, zone_speed=zone_speed)
 zone = choose_zone(record)
-reach = zone.curve()[:, 0].max()
-keep_off = settings.r_robot + settings.eps
-v_max, steps = settings.v_max, np.linspace(0, 3, 61)
-fig, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained", width_ratios=(1.5, 1))
-left.fill(*zone.curve().T, color=figures.RED, alpha=0.2, label="zone")
-left.plot(0, 0, marker=(3, 0, -90), color=figures.RED, markersize=10, linestyle="", label="person")
-left.add_patch(Circle((reach + keep_off + 1, 0), settings.r_robot, color=figures.BLUE, label="robot"))
-left.annotate("", (reach, 0), (reach + 1 + settings.eps, 0), arrowprops={"arrowstyle": "<->"})
-left.text(reach + 0.5, 0.12, "h = 1 m", ha="center")
-left.set(xlim=(-1.3, 4.1), ylim=(-1.3, 1.3))
-figures.label_metres(left, "h: the free distance from robot to zone")
-left.legend(loc="lower right", fontsize=8)
-right.plot(steps, gamma * steps / settings.dt, color=figures.BLUE)
-right.fill_between(steps, gamma * steps / settings.dt, 2, color=figures.GREY, alpha=0.4, label="forbidden")
-right.axhline(v_max, color=figures.BLACK, linestyle=":", label="top speed of the robot")
-right.plot(1, gamma / settings.dt, "o", color=figures.BLUE, label=f"h = 1 m: {gamma / settings.dt:.2g} m/s")
-right.set(xlim=(0, 3), ylim=(0, 2), xlabel="h [m]", ylabel="speed of approach [m/s]")
-right.set_title(f"The robot slows down when h < {v_max * settings.dt / gamma:.2g} m")
-right.legend(loc="lower right", fontsize=8)
-record.figure(fig, "limit")
+record.figure(plots.draw_limit(zone, settings), "limit")
 
 # %% jupyter={"source_hidden": true}
 # Parameters, with sources

@@ -65,6 +65,7 @@ import daqp
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import plots
 from IPython.display import Markdown
 from scipy.linalg import block_diag
 from studies.lesson_zones import choose_zone
@@ -79,29 +80,8 @@ same = {"gamma": gamma, "N": N, "N_h": N_h, "a_max": a_max}
 paper = szlib.MPCSettings.paper(**same)
 scene = replace(szlib.SCENARIOS["corridor"], start=np.array([-4.0, -0.4, 0, 0]))
 log = szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=paper))
-
-
-def draw_moment(ax, t, state, plan, person):
-    """The robot with its plan, a person with their zone, and the goal, at one time."""
-    for wall in scene.walls:
-        ax.plot(*wall.T, color=figures.BLACK, linewidth=3)
-    ax.add_patch(plt.Circle(state[:2], 0.5, color=figures.BLUE, alpha=0.4, lw=0, label="robot"))
-    ax.plot(*plan[:, :2].T, ".-", color=figures.GREEN, markersize=4, label=f"plan, {N} steps")
-    ax.plot(*zone.placed(person.position, person.heading).curve().T, color=figures.RED, label="zone")
-    heading = np.degrees(person.heading) - 90
-    ax.plot(*person.position, marker=(3, 0, heading), color=figures.RED, linestyle="", label="person")
-    ax.plot(*scene.goal, "D", color=figures.BLUE, markeredgecolor=figures.BLACK, linestyle="", label="goal")
-    ax.set(xlim=(-5, 5), ylim=(-2.5, 2.5))
-    figures.label_metres(ax, f"{t:.0f} s: {np.hypot(*state[2:]):.2f} m/s")
-
-
-fig, panels = plt.subplots(1, 3, figsize=(10.5, 3.1), layout="constrained", sharex=True, sharey=True)
-for ax, k in zip(panels, (40, 70, 90), strict=True):
-    person = scene.people[0].after(k * paper.dt)
-    draw_moment(ax, k * paper.dt, log.states[k], log.predicted[k], person)
-    ax.label_outer()
+fig = plots.draw_plans(log, (40, 70, 90))
 fig.suptitle(f"Ten times a second: the best {N} steps that obey the barriers; the first one is driven")
-figures.add_shared_legend(panels)
 record.figure(fig, "goal")
 
 # %% jupyter={"source_hidden": true}
@@ -403,8 +383,7 @@ print(f"steps without a plan: {unsolved} of {len(states)}")
 # Figure
 fig, panels = plt.subplots(2, 2, figsize=(10, 5.4), layout="constrained", sharex=True, sharey=True)
 for ax, k in zip(panels.flat, (20, 40, 70, 90), strict=True):
-    person = scene.people[0].after(k * dt)
-    draw_moment(ax, k * dt, states[k], predict(states[k], plans[k]), person)
+    plots.draw_moment(ax, log, k, states[k], predict(states[k], plans[k]))
     ax.plot(*log.states[:, :2].T, ":", color=figures.BLACK, label="path of szlib.MPCCBF")
     ax.plot(*states[: k + 1, :2].T, color=figures.BLUE, linewidth=2, label="path of your controller")
     ax.label_outer()

@@ -18,7 +18,7 @@ from .comparisons import (
     plot_sweep,
     plot_zone_sizes,
 )
-from .control import plot_distance, plot_step, plot_ways
+from .control import draw_limit, draw_moment, draw_plans, plot_distance, plot_step, plot_ways
 from .encounters import (
     draw_space_and_paths,
     plot_distance_by_direction,

@@ -1,25 +1,32 @@
-"""Figures of a distance (notebook 07), of a step (the laboratory) and of its ways (notebook 12)."""
+"""Figures of a distance and its limit (notebook 07), plans (08), a step (the laboratory), ways (12)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
 from szlib.control.obstacles import barrier, check_wall, ellipse_distance, segment_distance
+from szlib.control.settings import MPCSettings
 from szlib.control.step import Step
 from szlib.core.checks import Array
+from szlib.simulation import Run
 from szlib.workbook.figures.style import (
     BLACK,
     BLUE,
     GREEN,
+    GREY,
     ORANGE,
     RED,
     add_legend_below,
+    add_shared_legend,
     draw_obstacle,
     draw_person,
     get_axes,
@@ -216,3 +223,71 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
         ax,
         f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s",
     )
+
+
+def draw_limit(zone: Ellipse, settings: MPCSettings) -> Figure:
+    """Draw h between a robot and a zone, beside the speed of approach that gamma allows at each h.
+
+    Parameters
+    ----------
+    zone : zone of a person at the origin, who faces the robot.
+    settings : settings of the robot: gamma, dt, v_max, r_robot, eps.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> import plots
+    >>> figure = plots.draw_limit(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), szlib.MPCSettings())
+    >>> figure.axes[1].get_title()
+    'The robot slows down when h < 2 m'
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained", width_ratios=(1.5, 1))
+    reach = zone.curve()[:, 0].max()
+    robot = (reach + settings.r_robot + settings.eps + 1, 0)
+    left.fill(*zone.curve().T, color=RED, alpha=0.2, label="zone")
+    left.plot(0, 0, marker=(3, 0, -90), color=RED, markersize=10, linestyle="", label="person")
+    left.add_patch(Circle(robot, settings.r_robot, color=BLUE, label="robot"))
+    left.annotate("", (reach, 0), (reach + 1 + settings.eps, 0), arrowprops={"arrowstyle": "<->"})
+    left.text(reach + 0.5, 0.12, "h = 1 m", ha="center")
+    left.set(xlim=(-1.3, 4.1), ylim=(-1.3, 1.3))
+    label_metres(left, "h: the free distance from robot to zone")
+    rate = settings.gamma / settings.dt
+    h = np.linspace(0, 3, 61)
+    right.plot(h, rate * h, color=BLUE)
+    right.fill_between(h, rate * h, 2, color=GREY, alpha=0.4, label="forbidden")
+    right.axhline(settings.v_max, color=BLACK, linestyle=":", label="top speed of the robot")
+    right.plot(1, rate, "o", color=BLUE, label=f"h = 1 m: {rate:.2g} m/s")
+    right.set(xlim=(0, 3), ylim=(0, 2), xlabel="h [m]", ylabel="speed of approach [m/s]")
+    right.set_title(f"The robot slows down when h < {settings.v_max / rate:.2g} m")
+    for ax in (left, right):
+        ax.legend(loc="lower right", fontsize=8)
+    return figure
+
+
+def draw_plans(run: Run, rows: Sequence[int]) -> Figure:
+    """Draw the plan of the robot at some `rows` of a `run` in a corridor, side by side."""
+    figure, panels = plt.subplots(
+        1, len(rows), figsize=(10.5, 3.1), layout="constrained", sharex=True, sharey=True
+    )
+    for ax, row in zip(panels, rows, strict=True):
+        draw_moment(ax, run, row, run.states[row], run.predicted[row])
+        ax.label_outer()
+    add_shared_legend(panels)
+    return figure
+
+
+def draw_moment(ax: Axes, run: Run, row: int, state: Array, plan: Array) -> None:
+    """Draw a robot in a `state` with its `plan`, among the walls and the person of a `row` of a `run`."""
+    scene, time = run.scenario, row * run.settings.dt
+    person = scene.people[0].after(time)
+    (x, y), heading = person.position, person.heading or 0.0
+    for wall in scene.walls:
+        ax.plot(*wall.T, color=BLACK, linewidth=3)
+    radius = run.settings.r_robot
+    ax.add_patch(Circle(state[:2].tolist(), radius, color=BLUE, alpha=0.4, lw=0, label="robot"))
+    ax.plot(*plan[:, :2].T, ".-", color=GREEN, markersize=4, label=f"plan, {len(plan) - 1} steps")
+    ax.plot(*run.zones[0].placed((x, y), heading).curve().T, color=RED, label="zone")
+    draw_person(ax, x, y, heading, color=RED, label="person")
+    ax.plot(*scene.goal, "D", color=BLUE, markeredgecolor=BLACK, linestyle="", label="goal")
+    ax.set(xlim=(-5, 5), ylim=(-2.5, 2.5))
+    label_metres(ax, f"{time:.0f} s: {np.hypot(*state[2:]):.2f} m/s")

@@ -263,6 +263,16 @@ def test_the_reach_of_a_zone_is_its_outline_in_each_direction():
     assert truth == pytest.approx([1, 1, 1], abs=1e-5)
 
 
+def test_a_plan_is_drawn_with_the_person_where_they_are_at_that_time(log):
+    _, ax = plots.draw_plans(log, (0, 20)).axes
+    assert ax.get_title() == f"2 s: {log.speed[20]:.2f} m/s"
+    drawn = {line.get_label(): line.get_xydata() for line in ax.lines}
+    assert drawn["person"] == pytest.approx(log.people[20, :1, :2])
+    assert np.array_equal(
+        drawn[f"plan, {log.settings.N} steps"], log.predicted[20][:, :2]
+    )
+
+
 def test_given_axes_are_drawn_on(zone):
     _, ax = plt.subplots()
     assert figures.plot_zone(zone, 1.1, ax=ax) is ax
