@@ -78,15 +78,11 @@ scenes = {name: AtlasCell(name, width=width, pace=pace).scenario() for name in (
 waiting, making_room = (scenario_runs.drive_both(record, scene, settings) for scene in scenes.values())
 _, between = scenes["waiting"].claims[1].check(waiting.ours)
 _, back = scenes["making_room"].claims[0].check(making_room.ours)
-titles = (
-    f"Waiting: it goes in {between:.1f} s after the person is out",
-    f"Making room: it goes back {back:.1f} m",
-)
-fig, panels = plt.subplots(1, 2, figsize=(11, 3.9), sharey=True, layout="constrained")
-for ax, runs, title in zip(panels, (waiting, making_room), titles, strict=True):
-    scenario_runs.draw_space_time(ax, runs, title)
-figures.add_shared_legend(panels)
-record.figure(fig, "space-time")
+titles = {
+    f"Waiting: it goes in {between:.1f} s after the person is out": waiting,
+    f"Making room: it goes back {back:.1f} m": making_room,
+}
+record.figure(scenario_runs.draw_space_times(titles), "space-time")
 
 # %% jupyter={"source_hidden": true}
 # Parameters, with sources

@@ -50,6 +50,7 @@ pace = 1.2  # of the people in the crowd [m/s]
 # %% jupyter={"source_hidden": true}
 # Set-up, and the figure
 from dataclasses import replace
+from functools import partial
 from heapq import heappop, heappush
 
 import matplotlib.pyplot as plt
@@ -58,46 +59,24 @@ import pandas as pd
 import plots
 import shapely
 from IPython.display import Markdown, display
+from studies import scenario_runs
 from studies.lesson_zones import choose_zone
 
 import szlib
 from szlib.control import ways
-from szlib.simulation.closed_loop import LoopSettings, drive
-from szlib.simulation.scenario import Scenario
 from szlib.workbook import figures
 from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters, read_table
 
 record = NotebookRecord("12_among_people", globals(), plaza_zone=True)
 zone, paper = choose_zone(record), szlib.MPCSettings.paper()
 among = replace(szlib.MPCSettings.among_people(), time_limit=np.inf)
-rng = np.random.default_rng(seed)
-side, row = np.tile([-1, 1], 4), np.repeat(np.arange(4), 2)
-x = np.where(side < 0, 3.5, 7.5) - 0.8 * side * (row % 2) + rng.uniform(-0.4, 0.4, 8)
-y = side * (np.where(side < 0, 1.5, 2.5) + 4 * row) + rng.uniform(-0.4, 0.4, 8)
-crowd = tuple(szlib.Person((x[i], y[i]), (0.0, -pace * side[i])) for i in range(8))
-
-
-def drive_both(goal, people=(), walls=(), speed=0.0, title="A meeting", others=()):
-    """The run with each of the settings, and with `others`, of a robot that starts at the origin."""
-    walls = np.reshape(walls, (-1, 2, 2)).astype(float)
-    start = np.array([0.0, 0, speed, 0])
-    scene = Scenario("scene", start, np.array(goal), people, walls, title=title, duration=40.0)
-    each = {"paper": paper, "among people": among, **dict(others)}
-    robots = {name: szlib.MPCCBF(zone, walls=walls, settings=settings) for name, settings in each.items()}
-    return {name: drive(scene, robot, LoopSettings(until_arrival=True)) for name, robot in robots.items()}
-
-
+settings = {"paper": paper, "among people": among}
+drive_both = partial(scenario_runs.drive_each, zone, settings=settings)
+crowd = scenario_runs.make_streams(seed, pace)
 streams = drive_both((11.0, 0.0), crowd, title="Two streams")
 found = {name: log.metrics() for name, log in streams.items()}
 within = {name: paper.dt * each["violations"] for name, each in found.items()}
-fig, panels = plt.subplots(1, 2, figsize=(10, 2.9), layout="constrained", sharex=True, sharey=True)
-reach = np.concatenate([log.states[:, 1] for log in streams.values()])
-for ax, (name, log) in zip(panels, streams.items(), strict=True):
-    plots.plot_crowd(log, ax=ax).set(xlim=(-1, 12), ylim=(reach.min() - 2, reach.max() + 1))
-    arrives = f"goal in {found[name]['time_to_goal']:.1f} s" if log.success else "no goal in 40 s"
-    ax.set_title(f"{name}: {arrives}, " + (f"h < 0 for {within[name]:.1f} s" if within[name] else "h >= 0"))
-fig.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
-record.figure(fig, "crowd")
+record.figure(plots.draw_crowds(streams), "crowd")
 
 # %% jupyter={"source_hidden": true}
 # Parameters, with sources
@@ -435,7 +414,7 @@ print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of mar
 front = tuple(szlib.Person((7.0, y), (-1.0, 0.0)) for y in (-4.4, -2.2, 0.0, 2.2, 4.4))
 cheap = "zone_price 40"
 others = {cheap: replace(among, zone_price=40.0)}
-fronts = drive_both((8.0, 0.0), front, title="Five people side by side", others=others)
+fronts = drive_both((8.0, 0.0), front, title="Five people side by side", settings=settings | others)
 fig, panels = plt.subplots(3, 1, figsize=(10, 9.2), layout="constrained", sharex=True, sharey=True)
 for ax, (name, log) in zip(panels, fronts.items(), strict=True):
     plots.plot_crowd(log, ax=ax).set(xlim=(-16, 10), ylim=(-5.5, 5.5))

@@ -26,6 +26,6 @@ from .encounters import (
     plot_relative_positions,
     reference_frame,
 )
-from .simulation import plot_crowd, plot_robot_paths
+from .simulation import draw_crowds, plot_crowd, plot_robot_paths
 from .tracks import draw_map_and_speeds, plot_funnel, plot_map, plot_speed_histogram
 from .zones import draw_hull_and_zones, draw_outliers, draw_zone_and_reach, plot_hull

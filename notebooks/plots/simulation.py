@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from szlib.core.checks import Array
-from szlib.simulation import Run
+from szlib.simulation import Run, compute_metrics
 from szlib.simulation.robot_run import nanmin
 from szlib.workbook.figures.movies import place_zones
 from szlib.workbook.figures.simulation import (
@@ -103,3 +105,30 @@ def plot_crowd(run: Run, *, walked: Array | None = None, ax: Axes | None = None)
     draw_scenery(ax, run.scenario)
     draw_moving(ax, run, row, robot=BLUE, zone=RED)
     return label_metres(ax, run.scenario.title)
+
+
+def draw_crowds(runs: Mapping[str, Run]) -> Figure:
+    """Draw several runs along x through one crowd side by side, with the time to the goal and that with h < 0.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> import plots
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
+    >>> plots.draw_crowds({"ours": log, "again": log}).axes[0].get_title()
+    'ours: no goal in 2 s, h >= 0'
+    """
+    figure, panels = plt.subplots(
+        1, len(runs), figsize=(10, 2.9), layout="constrained", sharex=True, sharey=True
+    )
+    reach = np.concatenate([run.states[:, 1] for run in runs.values()])
+    for ax, (name, run) in zip(panels, runs.items(), strict=True):
+        plot_crowd(run, ax=ax).set(xlim=(-1, 12), ylim=(reach.min() - 2, reach.max() + 1))
+        metrics = compute_metrics(run)
+        arrival = f"goal in {metrics['time_to_goal']:.1f} s"
+        end = arrival if run.success else f"no goal in {run.time[-1]:.0f} s"
+        within = run.settings.dt * metrics["violations"]
+        ax.set_title(f"{name}: {end}, " + (f"h < 0 for {within:.1f} s" if within else "h >= 0"))
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
+    return figure

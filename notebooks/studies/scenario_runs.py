@@ -1,4 +1,4 @@
-"""One scenario of the paper, driven by the paper's chain and by ours, for notebooks 09 to 11."""
+"""One scene, driven by the paper's chain and by ours (notebooks 09 to 11), or with several settings (notebook 12)."""
 
 from __future__ import annotations
 
@@ -163,6 +163,43 @@ def draw_space_time(ax: Axes, runs: ScenarioRuns, title: str) -> None:
     ax.plot(time, x, ":", color=figures.RED, linewidth=2, label="person")
     ax.fill_between(time, x - reach, x + reach, color=figures.RED, alpha=0.15, lw=0, label="zone")
     ax.set(xlabel="time [s]", ylabel="x [m]", title=title, ylim=(-4, 6.5))
+
+
+def draw_space_times(runs: Mapping[str, ScenarioRuns]) -> Figure:
+    """Draw `draw_space_time` of several scenarios side by side; `runs` are by the titles of the panels."""
+    figure, panels = plt.subplots(1, len(runs), figsize=(11, 3.9), sharey=True, layout="constrained")
+    for ax, (title, each) in zip(panels, runs.items(), strict=True):
+        draw_space_time(ax, each, title)
+    figures.add_shared_legend(panels)
+    return figure
+
+
+def make_streams(seed: int, pace: float) -> tuple[szlib.Person, ...]:
+    """Eight people who walk across the way of a robot at this `pace` [m/s], four from each side."""
+    rng = np.random.default_rng(seed)
+    side = np.tile([-1, 1], 4)
+    row = np.repeat(np.arange(4), 2)
+    x = np.where(side < 0, 3.5, 7.5) - 0.8 * side * (row % 2) + rng.uniform(-0.4, 0.4, 8)
+    y = side * (np.where(side < 0, 1.5, 2.5) + 4 * row) + rng.uniform(-0.4, 0.4, 8)
+    return tuple(szlib.Person((x[i], y[i]), (0.0, -pace * side[i])) for i in range(8))
+
+
+def drive_each(
+    zone: szlib.Ellipse,
+    goal: tuple[float, float],
+    people: tuple[szlib.Person, ...] = (),
+    walls: Any = (),
+    *,
+    settings: Mapping[str, szlib.MPCSettings],
+    speed: float = 0.0,
+    title: str = "A meeting",
+) -> dict[str, Run]:
+    """The run with each of the `settings`, by name, of a robot that starts at the origin with a `speed` [m/s]."""
+    walls = np.reshape(walls, (-1, 2, 2)).astype(float)
+    start = np.array([0.0, 0, speed, 0])
+    scene = Scenario("scene", start, np.array(goal), people, walls, title=title, duration=40.0)
+    robots = {name: szlib.MPCCBF(zone, walls=walls, settings=each) for name, each in settings.items()}
+    return {name: szlib.drive(scene, robot) for name, robot in robots.items()}
 
 
 def find_holding_times(run: Run) -> dict[str, np.ndarray]:

@@ -110,3 +110,25 @@ def test_arrivals_are_listed_latest_first_and_a_robot_that_does_not_arrive_befor
     assert scenario_runs.list_arrivals(table) == (
         "3.8 m and 0.3 m/s: not within 30 s; 4.4 m and 0.7 m/s: 16.0 s; 5 m and 0.3 m/s: 12.0 s"
     )
+
+
+def test_two_streams_walk_towards_the_way_of_the_robot_at_one_pace():
+    people = scenario_runs.make_streams(seed=0, pace=0.5)
+    assert len(people) == 8 and people == scenario_runs.make_streams(seed=0, pace=0.5)
+    for person in people:
+        _, y = person.position
+        vx, vy = person.velocity
+        assert vx == 0 and abs(vy) == 0.5 and y * vy < 0
+
+
+def test_each_of_the_settings_drives_through_the_same_scene():
+    settings = {"slow": SETTINGS, "short": szlib.MPCSettings(N=4)}
+    wall = [((-1.0, 2.0), (6.0, 2.0))]
+    runs = scenario_runs.drive_each(
+        REFERENCE, (1.0, 0.0), walls=wall, speed=0.5, settings=settings
+    )
+    assert list(runs) == ["slow", "short"]
+    for name, run in runs.items():
+        assert run.settings == settings[name] and run.success
+        assert run.states[0].tolist() == [0, 0, 0.5, 0]
+        assert run.scenario.walls.tolist() == np.array(wall).tolist()
