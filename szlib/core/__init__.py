@@ -7,9 +7,3 @@ input_files  files of users, opened and read with care
 memory       the memory limit
 parallel     processes, or a Dask cluster
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__, ["checks", "errors", "files", "input_files", "memory", "parallel"]
-)

@@ -83,13 +83,13 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     ------
     SolverError : another shape, not numbers, not finite, or beyond +-`LARGEST`.
     """
-    expected = f"numbers of shape {shape}".replace("Ellipsis", "...")
     try:
-        array = np.asarray(value)
-    except ValueError as error:  # rows of several lengths
+        array = np.asarray(value)  # ValueError for rows of several lengths
+        if array.dtype.kind not in "iuf":
+            raise ValueError(array.dtype)
+    except ValueError as error:
+        expected = f"numbers of shape {shape}".replace("Ellipsis", "...")
         raise SolverError(f"{name} must be {expected}; got {value!r}") from error
-    if array.dtype.kind not in "iuf":
-        raise SolverError(f"{name} must be {expected}; got {value!r}")
     fits = array.shape == shape
     if ... in shape:
         fits = array.shape[max(0, array.ndim - len(shape) + 1) :] == shape[1:]
@@ -107,27 +107,20 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
 
 def check_vector(name: str, value: ArrayLike, n: int) -> list[float]:
     """The `n` numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
-    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.shape == (n,):
-        numbers: list[float] = value.tolist()
+    numbers: Any = value
+    if type(numbers) is np.ndarray and numbers.dtype is _DOUBLE:
+        numbers = numbers.tolist()
+    if isinstance(numbers, tuple | list) and len(numbers) == n:
         for each in numbers:  # all() takes three times as long
-            if not -LARGEST <= each <= LARGEST:
+            if type(each) is not float or not -LARGEST <= each <= LARGEST:
                 break
         else:
-            return numbers
+            return list(numbers)
     return cast(list[float], check_array(name, value, (n,)).tolist())
 
 
 def check_point(name: str, value: ArrayLike) -> tuple[float, float]:
     """The two numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
-    if isinstance(value, tuple) and len(value) == 2:
-        x, y = value
-        if (
-            type(x) is float
-            and type(y) is float
-            and abs(x) <= LARGEST
-            and abs(y) <= LARGEST
-        ):
-            return x, y
     x, y = check_vector(name, value, 2)
     return x, y
 

@@ -48,32 +48,25 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
     With `durable` the file survives a power failure (fsync of the file and of its folder). Two processes may
     write the same file: one of them wins. The folder must exist. Raises StorageError.
     """
-    path = Path(path)
+    path, data = Path(path), content.encode() if isinstance(content, str) else content
     unfinished = path.parent / f"{_UNFINISHED}{uuid.uuid4().hex}"
     advice = "make room, or choose a folder that is writable; files that were finished before are intact"
     with _explain_errors(f"{path}: cannot be written", advice):
         try:
-            _fill(
-                unfinished,
-                content.encode() if isinstance(content, str) else content,
-                durable,
-            )
+            _fill(unfinished, data, durable)
             unfinished.replace(path)
             if durable:
                 _sync(path.parent)
-        except BaseException:
-            with suppress(
-                OSError
-            ):  # a file that could not be created cannot be removed
+        finally:
+            with suppress(OSError):  # where it has its name, or was never made
                 unfinished.unlink()
-            raise
 
 
 def _fill(unfinished: Path, content: bytes, durable: bool) -> None:
     with unfinished.open("xb") as stream:
         stream.write(content)
+        stream.flush()
         if durable:
-            stream.flush()
             os.fsync(stream.fileno())
 
 
@@ -103,24 +96,23 @@ def store_cached(path: Path, content: bytes, made_of: Any) -> None:
 
 def write_checksum(path: Path, content: bytes, made_of: Any) -> None:
     """Write ``NAME.json`` beside the file `path`: the checksum of `content` and `made_of` (JSON values)."""
-    record = {"made_of": made_of, "sha256": hashlib.sha256(content).hexdigest()}
-    write_file(path.with_name(f"{path.name}.json"), json.dumps(record, indent=1))
+    record = json.dumps(_make_record(content, made_of), indent=1)
+    write_file(path.with_name(f"{path.name}.json"), record)
+
+
+def _make_record(content: bytes, made_of: Any) -> dict[str, Any]:
+    return {"made_of": made_of, "sha256": hashlib.sha256(content).hexdigest()}
 
 
 def load_cached(path: Path, made_of: Any) -> bytes | None:
     """The content of `path` from `store_cached`; None if missing, damaged, or not made of `made_of`."""
-    try:
+    with suppress(OSError, ValueError):
         record = json.loads(read_small(path.with_name(f"{path.name}.json")))
         with open_regular(path) as stream:
             content = stream.read()
-        matches = record["made_of"] == json.loads(json.dumps(made_of))
-        return (
-            content
-            if matches and record["sha256"] == hashlib.sha256(content).hexdigest()
-            else None
-        )
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+        if record == json.loads(json.dumps(_make_record(content, made_of))):
+            return content
+    return None
 
 
 def claim_folder(
@@ -148,7 +140,9 @@ def claim_folder(
         folder.mkdir(parents=True, exist_ok=True)
         owner = folder_purpose(folder)
         foreign = sorted(
-            entry.name for entry in folder.iterdir() if not _is_ours(entry)
+            entry.name
+            for entry in folder.iterdir()
+            if not (entry.name.startswith(MARKER) or (entry / MARKER).is_file())
         )
         if owner is None and foreign:
             raise StorageError(
@@ -157,19 +151,16 @@ def claim_folder(
             )
         if owner is None:
             with FileLock(folder / _LOCK):  # of two processes one comes first
-                owner = folder_purpose(folder) or _mark(folder, purpose)
-        _remove_abandoned(folder)
-    if owner != purpose:
+                if (owner := folder_purpose(folder)) is None:
+                    says = "Written by szlib, which may replace every file here."
+                    write_file(folder / MARKER, f"{purpose}\n{says}\n")
+        for entry in folder.glob(f"{_UNFINISHED}*"):  # of processes that were killed
+            with suppress(OSError):
+                if time.time() - entry.stat().st_mtime > _ABANDONED:
+                    entry.unlink()
+    if owner not in (None, purpose):
         raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
     return folder
-
-
-def _mark(folder: Path, purpose: str) -> str:
-    write_file(
-        folder / MARKER,
-        f"{purpose}\nWritten by szlib, which may replace every file here.\n",
-    )
-    return purpose
 
 
 def folder_purpose(folder: str | Path) -> str | None:
@@ -178,19 +169,6 @@ def folder_purpose(folder: str | Path) -> str | None:
         return read_small(Path(folder) / MARKER).decode("utf-8").splitlines()[0]
     except (OSError, ValueError, IndexError):
         return None
-
-
-def _is_ours(entry: Path) -> bool:
-    """Whether it is a marker, a lock, an unfinished file, or a claimed folder."""
-    return entry.name.startswith(MARKER) or (entry / MARKER).is_file()
-
-
-def _remove_abandoned(folder: Path) -> None:
-    """Remove unfinished files of processes that were killed."""
-    for entry in folder.glob(f"{_UNFINISHED}*"):
-        with suppress(OSError):
-            if time.time() - entry.stat().st_mtime > _ABANDONED:
-                entry.unlink()
 
 
 @contextmanager
@@ -217,42 +195,34 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
 def temporary_folder() -> Iterator[Path]:
     """A temporary folder, removed at the end; a later call removes it where this process is killed.
 
-    A lock in the folder says that its process lives, also if that runs in another container.
+    A lock beside it says that its process lives, also if that runs in another container.
     Raises StorageError where there is no room for it, or the umask forbids its use.
     """
     remove_abandoned_temporary()
-    with _explain_errors(
-        "no temporary folder", "make room, or name another one in $TMPDIR"
-    ):
-        while (locked := _make_temporary()) is None:
-            pass
-        folder, lock = locked
+    advice = "make room, or name another one in $TMPDIR"
+    with _explain_errors("no temporary folder", advice):
+        home = Path(tempfile.gettempdir()).resolve(strict=True)
+        folder = home / f"{_TEMPORARY}{os.getpid()}-{uuid.uuid4().hex}"
+        lock = FileLock(f"{folder}{_LOCK}")
+        lock.acquire()
     try:
+        with _explain_errors("no temporary folder", advice):
+            folder.mkdir(mode=0o700)
+        if folder.stat().st_mode & 0o700 != 0o700:
+            folder.rmdir()
+            raise StorageError(
+                "new files may not be used by their owner (umask); call umask 022 first"
+            )
         yield folder
     finally:
-        lock.release()
         shutil.rmtree(folder, ignore_errors=True)
+        _remove_lock(lock)
 
 
-def _make_temporary() -> tuple[Path, FileLock] | None:
-    """Make and lock a temporary folder; None if another process removed it before it was locked."""
-    folder = Path(tempfile.mkdtemp(prefix=f"{_TEMPORARY}{os.getpid()}-"))
-    mode = folder.stat().st_mode
-    if mode & 0o700 != 0o700:
-        folder.rmdir()
-        raise StorageError(
-            "new files may not be used by their owner (umask); call umask 022 first"
-        )
-    lock = FileLock(folder / _LOCK)
-    with suppress(FileNotFoundError):
-        lock.acquire()
-        if (
-            (folder / _LOCK).is_file() and folder.stat().st_mode == mode
-        ):  # the lock makes a missing folder
-            return folder, lock
-        lock.release()
-        shutil.rmtree(folder, ignore_errors=True)
-    return None
+def _remove_lock(lock: FileLock) -> None:
+    with suppress(OSError):
+        Path(lock.lock_file).unlink()
+    lock.release()
 
 
 @cache
@@ -266,21 +236,18 @@ def process_folder() -> Path:
 
 def remove_abandoned_temporary() -> None:
     """Remove temporary folders whose process has ended without removing them."""
-    for folder in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
+    for file in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*{_LOCK}"):
         with suppress(OSError, Timeout):
-            if (folder / _LOCK).is_file() and not folder.is_symlink():
-                with FileLock(folder / _LOCK, timeout=0):
-                    shutil.rmtree(folder, ignore_errors=True)
-                _remove_semaphores(folder.name.split("-")[1])
+            lock = FileLock(file, timeout=0)
+            lock.acquire()
+            shutil.rmtree(str(file).removesuffix(_LOCK), ignore_errors=True)
+            _remove_semaphores(file.name.split("-")[1])
+            _remove_lock(lock)
 
 
 def _remove_semaphores(number: str) -> None:
     """Remove the semaphores that joblib left in shared memory when the process `number` was killed."""
-    if (
-        number.isdecimal()
-        and Path("/proc/self").exists()
-        and not Path("/proc", number).exists()
-    ):
+    if Path("/proc/self").exists() and not Path("/proc", number).exists():
         for semaphore in Path("/dev/shm").glob(f"sem.loky-{number}-*"):
             with suppress(OSError):
                 semaphore.unlink()

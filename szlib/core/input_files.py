@@ -46,11 +46,11 @@ def read_small(path: Path, largest: int = 10_000_000) -> bytes:
 
 def read_json_object(path: Path) -> dict[str, Any]:
     """The object in the small JSON file `path`; empty if the file is missing or damaged."""
-    try:
+    with suppress(OSError, ValueError, RecursionError):
         content = json.loads(read_small(path))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return content if isinstance(content, dict) else {}
+        if isinstance(content, dict):
+            return content
+    return {}
 
 
 @contextmanager
@@ -73,12 +73,13 @@ def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
         token = _OPEN.set({**_OPEN.get({}), **opened})
         try:
             yield
-        except Exception:
-            _require_unchanged(opened, before)
-            raise
         finally:
             _OPEN.reset(token)
-        _require_unchanged(opened, before)
+            for path, stream in opened.items():
+                if _states(path, stream) != before[path]:
+                    raise DataError(
+                        f"{printable(path)}: changed while it was read; try again when it is complete"
+                    )
 
 
 def readable_path(path: Path) -> Path:
@@ -102,16 +103,6 @@ def _states(path: Path, stream: BinaryIO) -> list[tuple[float, ...]]:
     return [
         (s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in found
     ]
-
-
-def _require_unchanged(
-    opened: Mapping[Path, BinaryIO], before: Mapping[Path, object]
-) -> None:
-    for path, stream in opened.items():
-        if _states(path, stream) != before[path]:
-            raise DataError(
-                f"{printable(path)}: changed while it was read; try again when it is complete"
-            )
 
 
 def file_content(file: Path) -> tuple[int, str]:

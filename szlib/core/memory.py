@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
@@ -72,23 +72,14 @@ def _readable(size: float) -> str:
 def _available() -> float:
     """Bytes available without swapping, within the limit of a Linux container (cgroup version 2 or 1)."""
     available = float(psutil.virtual_memory().available)
-    for folder, limit_file, used_file in (
+    for folder, *files in (
         ("/sys/fs/cgroup", "memory.max", "memory.current"),
         ("/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
     ):
-        try:
-            allowed = float(Path(folder, limit_file).read_text(encoding="ascii"))
-            cached = re.search(
-                r"^(?:total_)?inactive_file (\d+)",
-                Path(folder, "memory.stat").read_text(),
-                re.M,
-            )
-            free = (
-                allowed
-                - float(Path(folder, used_file).read_text())
-                + float(cached[1] if cached else 0)
-            )
+        with suppress(OSError, ValueError):  # "max": no limit
+            allowed, used = (float(Path(folder, name).read_text()) for name in files)
+            statistics = Path(folder, "memory.stat").read_text()
+            cached = re.findall(r"^(?:total_)?inactive_file (\d+)", statistics, re.M)
+            free = allowed - used + sum(map(float, cached[:1]))
             return min(available, max(0.0, free))
-        except (OSError, ValueError):  # "max": no limit
-            continue
     return available

@@ -57,10 +57,14 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
     )
     guarded = [joblib.delayed(_run_in_share)(parent, share, task) for task in tasks]
     try:
-        with safe_path(), closing(_start(workers, guarded)) as results:
-            for result in results:
-                done += 1
-                yield result
+        with safe_path():
+            is_one = workers.n_jobs in (1, None)
+            with nullcontext() if is_one else uninterrupted():
+                results = workers(guarded)
+            with closing(results):
+                for result in results:
+                    done += 1
+                    yield result
     except TerminatedWorkerError as error:
         raise SzlibError(
             f"a worker process was killed after {done} of {len(tasks)} tasks, perhaps for lack of memory "
@@ -94,11 +98,6 @@ def uninterrupted() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _start(workers: joblib.Parallel, tasks: Sequence[Any]) -> Any:
-    with nullcontext() if workers.n_jobs in (1, None) else uninterrupted():
-        return workers(tasks)
 
 
 def limit_jobs(n_jobs: int, n_tasks: int) -> int:

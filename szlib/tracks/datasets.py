@@ -32,13 +32,9 @@ _ATTEMPTS = 3  # number of times that a file with a wrong hash is fetched
 
 def git_blob_id(file: str | Path) -> str:
     """The name that git gives to the content of `file`: SHA-1 of "blob", size, a zero byte, content."""
-    digest = hashlib.sha1(
-        f"blob {Path(file).stat().st_size}\0".encode(), usedforsecurity=False
-    )
-    with Path(file).open("rb") as stream:
-        while block := stream.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
+    content = Path(file).read_bytes()
+    head = f"blob {len(content)}\0".encode()
+    return hashlib.sha1(head + content, usedforsecurity=False).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -64,12 +60,8 @@ class DataSet:
 
 def _read_hashes(name: str) -> dict[str, str]:
     """Hash by file name, from a list "hash  name"."""
-    lines = (
-        (Path(__file__).parent / "hashes" / f"{name}.txt")
-        .read_text(encoding="utf-8")
-        .splitlines()
-    )
-    return {file: value for value, file in (line.split() for line in lines)}
+    text = (Path(__file__).parent / "hashes" / f"{name}.txt").read_text("utf-8")
+    return {file: value for value, file in map(str.split, text.splitlines())}
 
 
 # Data sets by name.
@@ -150,9 +142,8 @@ def _find_named(name: str) -> list[Path]:
     data = DATA_SETS[name]
     if folder := os.environ.get(DATA_DIR_VARIABLE):
         return [_verify(Path(folder) / name / file, data) for file in data.hashes]
-    home = pooch.os_cache("szlib") / name
     store = pooch.create(
-        path=home,
+        path=pooch.os_cache("szlib") / name,
         base_url=data.url,
         registry=dict.fromkeys(data.hashes),
         retry_if_failed=2,
@@ -189,30 +180,26 @@ def _verify(file: Path, data: DataSet) -> Path:
 
 def _expand(name: str | Path) -> list[Path]:
     """The regular files that a path stands for; reading a FIFO or a device would never end."""
-    path = Path(name)
+    path, shown = Path(name), printable(name)
     try:
+        found = [path] if path.exists() or path.is_symlink() else []
         if path.is_dir():
             found = [file for file in path.iterdir() if not file.name.startswith(".")]
-        elif path.exists() or path.is_symlink():
-            found = [path]
-        else:
+        elif not found:
             found = list(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
     except (OSError, ValueError, NotImplementedError, IndexError, re.error) as error:
         raise DataError(
-            f"{printable(name)}: cannot be looked up ({error}); expected {_NAMED}, or paths"
+            f"{shown}: cannot be looked up ({error}); expected {_NAMED}, or paths"
         ) from error
     files = sorted(file for file in found if file.is_file())
     if not files:
         reason = "is no regular file (or leads nowhere)" if found else "no such file"
         raise DataError(
-            f"{printable(name)}: {reason}; expected {_NAMED}, or a file, folder or glob of tracks"
+            f"{shown}: {reason}; expected {_NAMED}, or a file, folder or glob of tracks"
         )
-    others = sum(
-        not file.is_file() and not (path.is_dir() and file.is_dir()) for file in found
-    )
-    if others:
+    folders = [file for file in found if path.is_dir() and file.is_dir()]
+    if others := len(found) - len(files) - len(folders):
         warn(
-            f"{printable(name)}: left out what is no regular file: {others} x folder or other",
-            4,
+            f"{shown}: left out what is no regular file: {others} x folder or other", 4
         )
     return files

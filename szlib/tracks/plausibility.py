@@ -21,7 +21,6 @@ from .shapes import SHAPES
 
 # widest site [m]; a smaller site [m] means that metres were read as millimetres
 _SITES = (0.5, 1000.0)
-_MANY = 1_000_000  # rows that tell the size of a site
 # greatest median and greatest 90 % quantile of the speed of people [m/s]
 _FASTEST = (3.0, 6.0)
 # smallest and greatest 90 % quantile of the speed where people certainly walk [m/s]
@@ -107,56 +106,56 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
         high_speed=float(fast),
         interval=float(step),
         irregularity=float((high - low) / step) if step > 0 else np.inf,
-        width=float(np.ptp(np.quantile([x, y], [0.01, 0.99], axis=1), axis=0).max()),
+        width=_spread(np.array([x, y])),
         roughness=float(np.median(change) / median) if len(change) and median else 0.0,
     )
 
 
-def check_people(
-    rows: pl.DataFrame, recipe: Recipe, path: Path, *, is_unit_given: bool
-) -> None:
-    """Raise DataError where people cannot move as they do in a table, and suggest another reading.
+def check_people(rows: pl.DataFrame, recipe: Recipe, given: Recipe, path: Path) -> None:
+    """Raise DataError where people cannot move as in a table, or on such a site; suggest another reading.
+
+    Where the user has given the unit, a DataWarning is enough, as where people may just all be standing.
 
     Parameters
     ----------
     rows : t [s], id, x, y [m].
     recipe, path : how the file was read, and the file.
-    is_unit_given : whether the user has given the unit; then a DataWarning is enough, as where people may
-        just all be standing.
+    given : the recipe that the user gave.
     """
-    if is_table_known(recipe):
-        return
-    found = measure_motion(seen := first_rows(rows))
-    fault = found.fault if found else "people are seen too briefly"
-    if found and not fault and found.irregularity <= _REGULAR:
-        return
-    advice = suggest_reading(seen, recipe)
-    if not advice and not (found and fault):
-        return  # few rows, or people who are seen at irregular times
-    message = f"{path}: {fault or 'people are seen at irregular times'}"
-    message += f"; {advice}" if advice else ""
-    if is_unit_given and advice:
-        warn(message)
-    elif not is_unit_given and (advice or (found and found.high_speed > _FASTEST[1])):
-        if found and found.median_speed > _FASTEST[0]:
-            scale = float(f"{_WALK / found.median_speed:.2g}")
-            message += f"; if they are pixels in which people walk at {_WALK:g} m/s, {advise(scale=scale)}"
-        raise DataError(f"{message}; if people do move like that, {advise(unit='m')}")
-
-
-def check_unit(rows: pl.DataFrame, recipe: Recipe, path: Path) -> None:
-    """Raise DataError where `rows` x, y [m] of file `path`, read with a `recipe`, span an impossible site."""
-    places, metres = rows.select("x", "y"), recipe.metres or 1.0
-    reach = float(places.select(pl.all().abs().max()).to_numpy().max())
-    some = places.gather_every(places.height // _MANY + 1)
-    spread = float(np.ptp(np.quantile(some, [0.01, 0.99], axis=0), axis=0).max())
+    seen, is_given = first_rows(rows), given.has_places
+    if not is_table_known(recipe):
+        found = measure_motion(seen)
+        fault = found.fault if found else "people are seen too briefly"
+        is_fast = found is not None and found.high_speed > _FASTEST[1]
+        is_odd = fault or (found and found.irregularity > _REGULAR)
+        advice = suggest_reading(seen, recipe) if is_odd else ""
+        message = f"{path}: {fault or 'people are seen at irregular times'}"
+        message += f"; {advice}" if advice else ""
+        if is_given and advice:
+            warn(message)
+        elif not is_given and (advice or is_fast):
+            if found and found.median_speed > _FASTEST[0]:
+                scale = float(f"{_WALK / found.median_speed:.2g}")
+                advice = advise(scale=scale)
+                message += f"; if they are pixels in which people walk at {_WALK:g} m/s, {advice}"
+            raise DataError(
+                f"{message}; if people do move like that, {advise(unit='m')}"
+            )
+    metres, reach = recipe.metres or 1.0, np.abs(seen[2:]).max()
     is_small = metres < 1 and reach < _SITES[0]
-    if is_small or (metres == 1 and spread > _SITES[1]):
+    spread = reach if is_small else _spread(seen[2:])
+    if not is_given and (is_small or (metres == 1 and spread > _SITES[1])):
         unit, other = ("m", "mm") if is_small else ("mm", "m")
         raise DataError(
-            f"{path}: positions span {reach if is_small else spread:.3g} m, read as {recipe.file_format}; if "
-            f"they are in {unit}, {advise(unit=unit)}; if the site is of that size, {advise(unit=other)}"
+            f"{path}: positions span {spread:.3g} m, read as {recipe.file_format}; if they are in {unit}, "
+            f"{advise(unit=unit)}; if the site is of that size, {advise(unit=other)}"
         )
+
+
+def _spread(places: np.ndarray) -> float:
+    """The wider side of the rectangle that holds nearly all `places`, shape (2, n)."""
+    low, high = np.quantile(places, [0.01, 0.99], axis=1)
+    return float((high - low).max())
 
 
 def is_table_known(recipe: Recipe) -> bool:
@@ -169,19 +168,16 @@ def find_implausible(rows: pl.DataFrame) -> list[str]:
     """What people cannot do in `rows` day, id, t [s], x, y [m], sorted by day, id and t, as texts."""
     person = pl.struct("day", "id").rle_id()
     first = rows.head(MOST_SHOWN).select("t", person.alias("id"), "x", "y").to_numpy()
-    motion, n_jumps, fastest = measure_motion(first.astype(float).T), 0, 0.0
-    step = pl.col("t").diff()
-    moved = (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
+    motion = measure_motion(first.astype(float).T)
+    step, x, y = (pl.col(name).diff() for name in ("t", "x", "y"))
+    moved = (x**2 + y**2).sqrt()
     is_jump = (person.diff() == 0) & (moved > _JUMP + _SPRINT * step)
-    for block in rows.iter_slices(
-        1 << 20
-    ):  # a table of the steps of a whole day would double its memory
-        speeds = block.select((moved / step).filter(is_jump)).to_series()
-        n_jumps, fastest = n_jumps + len(speeds), max([fastest, *speeds.top_k(1)])
-    texts = [motion.fault] if motion is not None and motion.fault else []
-    if n_jumps:
+    speeds = rows.select((moved / step).filter(is_jump)).to_series()
+    texts = [motion.fault] if motion and motion.fault else []
+    if n := len(speeds):
+        fastest = speeds.to_numpy().max()
         texts.append(
-            f"people jump {n_jumps:,} times, at up to {fastest:,.0f} m/s: positions or ids are wrong"
+            f"people jump {n:,} times, at up to {fastest:,.0f} m/s: positions or ids are wrong"
         )
     return texts
 

@@ -23,7 +23,6 @@ from . import funnels
 from .plausibility import (
     MOST_SHOWN,
     check_people,
-    check_unit,
     describe_rows,
     find_implausible,
     first_rows,
@@ -234,9 +233,7 @@ def _accept(rows: Rows, path: Path, given: Recipe) -> LoadedFile:
     rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
     name = f"read {path.name}{rate}"
     stage = funnels.stage(name, table.height, good.height, reasons)
-    check_people(good, recipe, path, is_unit_given=given.has_places)
-    if not given.has_places:
-        check_unit(good, recipe, path)
+    check_people(good, recipe, given, path)
     return LoadedFile(path, with_days(good, path, recipe), stage, recipe)
 
 

@@ -42,6 +42,13 @@ FILE_NAME = "reading.json"  # a recipe beside the data
 COMMAND_VARIABLE = "SZLIB_COMMAND"
 _LONGEST_COMMAND = 400  # a longer one, of many files, is not repeated
 _FASTEST_COUNT = 1e9  # highest frame rate [1/s]
+# The lowest and the highest value of each number, and what it is.
+_BOUNDS = {
+    "scale": (1e-12, 1e3, "metres in one unit of position, more than 0"),
+    "frame_rate": (1, _FASTEST_COUNT, f"frames a second from 1 to {_FASTEST_COUNT:g}"),
+    "max_gap": (SHORTEST_GAP + 1e-9, np.inf, "longer than the clock's 0.1 s"),
+    "max_rejected": (0, 1, "from 0 to 1"),
+}
 
 
 @dataclass(frozen=True)
@@ -98,27 +105,13 @@ class Recipe:
     max_rejected: float | None = None
 
     def __post_init__(self) -> None:
-        units, times = [*UNITS, PIXELS, DEGREES], list(TIME_UNITS)
-        bounds = {
-            "unit": (units.__contains__, f"one of {units}"),
-            "time_unit": (times.__contains__, f"one of {times}"),
-            "scale": (
-                lambda s: 0 < s <= 1e3,
-                "metres in one unit of position, more than 0",
-            ),
-            "frame_rate": (
-                lambda r: 1 <= r <= _FASTEST_COUNT,
-                f"frames a second from 1 to {_FASTEST_COUNT:g}",
-            ),
-            "max_gap": (
-                lambda gap: gap > SHORTEST_GAP,
-                "longer than the clock's 0.1 s",
-            ),
-            "max_rejected": (lambda share: 0 <= share <= 1, "from 0 to 1"),
-        }
-        for name, (holds, expected) in bounds.items():
+        for name, (low, high, expected) in _BOUNDS.items():
             value = getattr(self, name)
-            require(value is None or holds(value), name, value, expected)
+            require(value is None or low <= value <= high, name, value, expected)
+        units, times = [None, *UNITS, PIXELS, DEGREES], [None, *TIME_UNITS]
+        require(self.unit in units, "unit", self.unit, f"one of {units[1:]}")
+        expected = f"one of {times[1:]}"
+        require(self.time_unit in times, "time_unit", self.time_unit, expected)
         for name, shape in (("homography", (3, 3)), ("origin", (2,))):
             if (given := getattr(self, name)) is not None:
                 numbers = np.ravel(np.array(given, float))
@@ -129,15 +122,21 @@ class Recipe:
             object.__setattr__(self, "unit", DEGREES)
         if self.unit in UNITS and self.scale:
             raise DataError("both unit and scale are given; expected one of them")
-        if unknown := sorted(set(self.columns or ()) - set(QUANTITIES)):
+        columns = set(self.columns or ())
+        if unknown := sorted(columns - set(QUANTITIES)):
             raise DataError(
                 f"columns: {unknown} are unknown; expected some of {list(QUANTITIES)}"
             )
-        if {"t", "frame"} <= set(self.columns or ()):
+        if columns >= {"t", "frame"}:
             raise DataError("columns: both t and frame are given; expected one of them")
-        is_text = self.where is None or isinstance(self.where, str)
+        is_text = isinstance(self.where, str | None)
         require(is_text, "where", self.where, "a condition in SQL, as text")
-        _check_zone(self.tz)
+        try:
+            ZoneInfo("UTC" if self.tz is None else self.tz)
+        except (KeyError, ValueError, OSError) as error:
+            raise DataError(
+                f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'"
+            ) from error
 
     @property
     def metres(self) -> float | None:
@@ -152,20 +151,15 @@ class Recipe:
     def over(self, base: Recipe) -> Recipe:
         """This recipe, completed by values of `base` where it has none."""
         own, more = self.as_json(), base.as_json()
-        for names in (
-            ("frame_rate", "time_unit"),
-            ("unit", "scale", "homography", "origin"),
+        mine, others = own.get("columns", {}), more.get("columns", {})
+        for given, kept, names in (
+            (own, more, ("frame_rate", "time_unit")),
+            (own, more, ("unit", "scale", "homography", "origin")),
+            (mine, others, ("t", "frame")),
         ):
-            if set(names) & own.keys():
-                more = {
-                    name: value for name, value in more.items() if name not in names
-                }
-        columns = more.get("columns", {}) | own.get("columns", {})
-        if time := {"t", "frame"} & own.get("columns", {}).keys():
-            columns = {
-                k: v for k, v in columns.items() if k in time or k not in ("t", "frame")
-            }
-        return Recipe(**more | own | {"columns": columns or None})
+            for name in names if given.keys() & names else ():
+                kept.pop(name, None)
+        return Recipe(**more | own | {"columns": (others | mine) or None})
 
     def as_json(self) -> dict[str, Any]:
         """The values that are given, as JSON: ``Recipe(**recipe.as_json())`` is the same."""
@@ -203,15 +197,11 @@ def find_recipe(
 ) -> Recipe:
     """The `recipe` with `parameters` in place of its own; without one, that beside the first of `files`."""
     if recipe is None:
-        beside = [
-            Path(each).parent / FILE_NAME
-            for each in files[:1]
-            if isinstance(each, str | Path)
-        ]
-        recipe = Recipe.load(beside[0]) if beside and beside[0].is_file() else Recipe()
+        recipe, first = Recipe(), next(iter(files), None)
+        if isinstance(first, str | Path):
+            beside = Path(first).parent / FILE_NAME
+            recipe = Recipe.load(beside) if beside.is_file() else recipe
     given = {name: value for name, value in parameters.items() if value is not None}
-    if unknown := sorted(given.keys() - {each.name for each in fields(Recipe)}):
-        raise TypeError(f"unexpected keyword arguments {unknown}")
     return Recipe(**given).over(recipe) if given else recipe
 
 
@@ -243,13 +233,3 @@ def advise(**recipe: Any) -> str:
         )
         return f"try: {command} {arguments(recipe)}"
     return "pass " + " and ".join(f"{name}={value!r}" for name, value in recipe.items())
-
-
-def _check_zone(tz: str | None) -> None:
-    """Raise DataError where `tz` is no time zone."""
-    try:
-        ZoneInfo("UTC" if tz is None else tz)
-    except (KeyError, ValueError, OSError) as error:
-        raise DataError(
-            f"unknown time zone {tz!r}; expected one like 'Asia/Tokyo'"
-        ) from error

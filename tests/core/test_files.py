@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import errno
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -143,29 +142,25 @@ def test_only_old_unfinished_files_are_removed(tmp_path: Path) -> None:
     assert [path.name for path in folder.glob(".szlib-part-*")] == [".szlib-part-new"]
 
 
-@pytest.mark.parametrize("is_locked", [False, True])
-def test_a_temporary_folder_that_another_process_takes_for_abandoned_is_made_again(
-    is_locked: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_temporary_folder_is_kept_where_another_process_takes_its_lock_for_abandoned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Between the making of its lock and the locking, another process may remove the folder."""
+    """Between the making of the lock and the locking, another process may lock and remove it."""
     monkeypatch.setattr(files.tempfile, "tempdir", str(tmp_path))
-    acquire, removed = files.FileLock.acquire, list[Path]()
+    acquire, seen = files.FileLock.acquire, list[Path]()
 
-    def acquire_late(
-        lock: files.FileLock, *arguments: object, **named: object
-    ) -> object:
-        folder = Path(lock.lock_file).parent
-        if removed:
-            return acquire(lock, *arguments, **named)
-        removed.append(folder)
-        found = acquire(lock, *arguments, **named) if is_locked else None
-        shutil.rmtree(folder)
-        return found if is_locked else acquire(lock, *arguments, **named)
+    def acquire_late(lock: files.FileLock, **named: object) -> object:
+        seen.append(Path(lock.lock_file))
+        if len(seen) == 1:
+            seen[0].touch()
+            files.remove_abandoned_temporary()
+            assert not seen[0].exists()
+        return acquire(lock, **named)
 
     monkeypatch.setattr(files.FileLock, "acquire", acquire_late)
     with files.temporary_folder() as folder:
+        files.remove_abandoned_temporary()
         assert folder.is_dir()
-        assert folder != removed[0]
     assert list(tmp_path.iterdir()) == []
 
 
