@@ -59,6 +59,7 @@ import warnings
 
 import matplotlib.pyplot as plt
 import numpy as np
+import plots
 from IPython.display import Markdown
 from laboratory import show_sliders
 from studies import paper_claims as claims
@@ -76,49 +77,11 @@ record = NotebookRecord("05_zones", globals())
 samples = record.cache.encounters()
 fit = record.cache.method.fit_options()
 zone = szlib.SocialZone.fit(samples, method=quantile_zone.NAME, q=q, seed=seed, **fit)
-settings = PlazaSettings()
-truth = {v: settings.true_zone(v) for v in zone.ellipses} if record.cache.is_synthetic else {}
+truth = {v: PlazaSettings().true_zone(v) for v in zone.ellipses} if record.cache.is_synthetic else {}
 kept = zone.ellipse(zone_speed)
 bands = zone.uncertainty.bands[zone.uncertainty.bands["speed"] == zone_speed]
-degrees = np.degrees(bands["direction"].to_numpy())
-
-
-def distance_by_direction(ellipse):
-    x, y = ellipse.curve(2000).T
-    return np.interp(degrees, np.degrees(np.arctan2(y, x)), np.hypot(x, y), period=360)
-
-
-fig, (left, right) = plt.subplots(1, 2, figsize=(11, 3.7), layout="constrained", width_ratios=(1, 1.5))
-for ax, shown in ((left, kept.curve().T), (right, (degrees, distance_by_direction(kept)))):
-    ax.plot(*shown, color=figures.BLUE, linewidth=2, label="quantile zone")
-if truth:
-    left.plot(*truth[zone_speed].curve().T, ":", color=figures.RED, linewidth=2)
-    right.plot(
-        degrees,
-        distance_by_direction(truth[zone_speed]),
-        ":",
-        color=figures.RED,
-        linewidth=2,
-        label="zone that people keep (truth)",
-    )
-right.fill_between(
-    degrees,
-    bands["low"],
-    bands["high"],
-    color=figures.ORANGE,
-    alpha=0.5,
-    label="95 % interval of the quantile zone",
-)
-left.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
-figures.label_metres(left, f"Where 5 % come nearer, at {zone_speed:g} m/s", person=True)
-right.set(
-    xlabel="direction [deg] (0 is ahead, 90 left)",
-    ylabel="reach of the zone [m]",
-    xticks=range(-180, 181, 90),
-)
 widths = 100 * (bands["high"] - bands["low"])
-right.set_title(f"The same, unrolled: the interval is {widths.min():.0f} to {widths.max():.0f} cm wide")
-right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+fig = plots.draw_zone_and_reach(kept, truth.get(zone_speed), bands, zone_speed)
 record.figure(fig, "zone")
 
 # %% jupyter={"source_hidden": true}

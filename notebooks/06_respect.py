@@ -54,7 +54,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import plots
 from IPython.display import Markdown
-from studies import collision, quantile_zone, real_day, respect
+from studies import collision, quantile_zone, real_day, respect, shifted_pair
 
 import szlib
 from szlib.plaza import PlazaSettings
@@ -66,33 +66,16 @@ record = NotebookRecord("06_respect", globals())
 is_plaza = record.cache.is_synthetic
 tracks = respect.make_busy_plaza(seed) if is_plaza else record.cache.tracks()
 square = szlib.ATC_SQUARE if is_plaza else record.cache.find_area(tracks)
-conditions = record.cache.method.encounter_settings()  # as in chapter 02
 r_max = record.cache.method.r_max
-samples = szlib.find_encounters(tracks, square=square, settings=conditions)
-options = {"square": square, "settings": conditions, "r_max": r_max, "progress": shifts > 20}
-null = szlib.null_encounters(tracks, shifts=shifts, seed=seed, **options)
+options = {"square": square, "settings": record.cache.method.encounter_settings()}  # as in chapter 02
+samples = szlib.find_encounters(tracks, **options)
+null = szlib.null_encounters(tracks, **options, shifts=shifts, seed=seed, r_max=r_max, progress=shifts > 20)
 strangers, others = szlib.of_kind(samples, "strangers"), null.of_kind("strangers")
 tests = {"everybody": szlib.null_test(samples, null), "strangers": szlib.null_test(strangers, others)}
 respected, found = tests["strangers"].respect, tests["strangers"].is_significant
-pairs = strangers.groupby("encounter").agg(kind=("kind", "first"), nearest=("distance", "min"))
-seen, chance = (t[t["nearest"] < r_max] for t in (pairs, others.encounters))
-mine, theirs, delayed, delay = respect.shift_a_pair(tracks, strangers)
-fig, panels = plt.subplots(1, 3, figsize=(12, 3.4), layout="constrained", width_ratios=(1, 1, 1.2))
-respect.draw_pair(panels[0], mine, theirs, "As they walked")
-respect.draw_pair(panels[1], mine, delayed, f"One {abs(delay):.1f} s {'later' if delay > 0 else 'earlier'}")
-bins, weights = np.arange(0, r_max + 0.05, 0.1), np.full(len(chance), len(seen) / len(chance))
-line = {"histtype": "step", "color": figures.BLACK, "linestyle": "--", "linewidth": 1.5}
-panels[2].hist(seen["nearest"], bins, color=figures.BLUE, alpha=0.7, label="as they walked")
-panels[2].hist(chance["nearest"], bins, weights=weights, **line, label="shifted in time")
-panels[2].set(xlabel="nearest approach [m]", ylabel="encounters of strangers")
-near, by_shift = (100 * (people["nearest"] < 0.7).mean() for people in (seen, chance))
-panels[2].set_title(f"Within 0.7 m: {near:.0f} % of the pairs, shifted {by_shift:.0f} %")
-panels[2].legend(loc="upper left", fontsize=8)
-both = np.vstack([mine, theirs, delayed])
-for ax in panels[:2]:
-    ax.set(xlim=(both[:, 0].min() - 0.3, both[:, 0].max() + 0.3))
-    ax.set(ylim=(both[:, 1].min() - 0.3, both[:, 1].max() + 0.3))
-record.figure(fig, "pair")
+seen, chance = shifted_pair.list_approaches(strangers, others, r_max)
+pair = respect.shift_a_pair(tracks, strangers)
+record.figure(shifted_pair.draw_shifted_pair(pair, seen["nearest"], chance["nearest"], r_max), "pair")
 
 # %% jupyter={"source_hidden": true}
 # Parameters, with sources
@@ -267,6 +250,7 @@ record.check(
 
 # %% jupyter={"source_hidden": true}
 # Figure
+bins = np.arange(0, r_max + 0.05, 0.1)
 beyond = {
     k: max((chance.loc[chance["kind"] == k, "nearest"] > 1.2).sum(), 1) for k in chance["kind"].unique()
 }

@@ -14,8 +14,8 @@ from szlib.workbook import folders
 from szlib.workbook.record.parameters import METHOD_DEFAULTS, read_defaults
 
 SOURCES = folders.list_notebooks()
-MAX_LINES, SET_UP = 25, 60
-"""Lines of the longest cell and before the first figure; of the folded set-up with its figure."""
+MAX_LINES = 25
+"""Lines of the longest cell, and before the first figure."""
 MAX_CHECKS = 8
 """Checks and claims that a cell shows; the outputs of longer lists are folded."""
 CHAPTERS = [s for s in SOURCES if "01" <= s.stem[:2] <= "13"]
@@ -114,8 +114,7 @@ class TestEach:
         assert sum("parameters" in c.metadata.get("tags", []) for c in all_cells) == 1
         code = [c for c in all_cells if c.cell_type == "code"]
         lengths = {c.source.splitlines()[0]: code_lines(c) for c in code}
-        limit = dict.fromkeys(lengths, MAX_LINES) | {"# Set-up, and the figure": SET_UP}
-        assert {k: n for k, n in lengths.items() if n > limit[k]} == {}
+        assert {name: n for name, n in lengths.items() if n > MAX_LINES} == {}
 
     def test_notebook_has_the_common_parameters(self, source):
         (tagged,) = [
