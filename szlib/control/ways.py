@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from cmath import phase, rect
 from collections.abc import Hashable, Sequence
+from itertools import combinations
 from math import acos, ceil, dist, hypot, inf, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -28,7 +29,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import Obstacles, Zone, barrier, find_bodies, find_places
+from .obstacles import Obstacles, Zone, find_bodies, find_places
 from .people import STANDING_SPEED
 from .settings import MPCSettings
 
@@ -271,7 +272,7 @@ class Map:
         return np.concatenate([people, np.repeat(still, len(_TIMES), axis=1)])
 
 
-def _choose_cell(clearance: float) -> float:
+def choose_cell(clearance: float) -> float:
     """Side of a cell with which a map shows walls of this `clearance` [m]."""
     return min(CELL, max(_LEAST, clearance) / _MOST_SHARE)
 
@@ -305,7 +306,7 @@ class WayFinder:
         m = self._get_map(at, goal)
         is_searched = not self._steps or zones.size != self._n_people
         if is_searched:
-            self._search(m, at, goal, _Stamps(zones, groups, m.cell, self._s))
+            self._search(m, at, goal, Stamps(zones, groups, m.cell, self._s))
             self._steps, self._n_people = self._every, zones.size
         self._steps -= 1
         target, length = self._find_target(m, at, self._ways[0].points, self._blocked)
@@ -325,12 +326,12 @@ class WayFinder:
     def _get_map(self, at: Point, goal: Point) -> Map:
         """The map that holds these points."""
         if self._map is None or not self._map.holds(at, goal):
-            side = _choose_cell(self._s.r_robot + self._s.eps)
+            side = choose_cell(self._s.r_robot + self._s.eps)
             self._map, self._known = Map(self._fixed, np.array([at, goal]), side), ()
             self._steps = 0
         return self._map
 
-    def _search(self, m: Map, at: Point, goal: Point, stamps: _Stamps) -> None:
+    def _search(self, m: Map, at: Point, goal: Point, stamps: Stamps) -> None:
         """Find the ways anew, and choose one."""
         places = stamps.find_places(_TIMES)
         is_near = np.hypot(*(places[:, 0] - at).T) < _PEOPLE
@@ -340,17 +341,19 @@ class WayFinder:
         people = places[near]
         known = (self._goal, *np.round(places[stands, 0] / _MOVED).ravel().tolist())
         if known != self._known or not np.isfinite(m.seconds_to_goal[m.find_cell(at)]):
-            price = np.zeros((1, *m.shape))
-            stamps.add(price, np.flatnonzero(stands), np.zeros(1), m.corner)
-            self._is_reached = m.measure(at, goal, self._s.v_max, price[0])
-            self._known, self._blocked = known, ~m.free | (price[0] >= BODY_SECOND)
+            still = np.flatnonzero(stands)
+            (price,) = stamps.find_prices(still, np.zeros(1), m.corner, m.shape)
+            self._is_reached = m.measure(at, goal, self._s.v_max, price)
+            self._known, self._blocked = known, ~m.free | (price >= BODY_SECOND)
         walks = np.flatnonzero(is_near & ~stands)
         around = m.list_around(at, people)
-        found = self._find_ways(m, at, goal, people, around, stamps, walks)
-        ways = sorted(found, key=lambda way: way.cost)
+        ways = self._find_ways(m, at, goal, people, around, stamps, walks)
+        ways.sort(key=lambda way: way.cost)
         if self._ways:
-            before = _cut(self._ways[0], at)
-            kept = [way for way in ways if not _differ(way, before, around)]
+            before = _find_turns(_cut(self._ways[0], at), around)
+            kept = [
+                way for way in ways if not _differ(_find_turns(way, around), before)
+            ]
             if kept and kept[0].cost < ways[0].cost + SWITCH_GAIN:
                 ways = [kept[0], *(way for way in ways if way is not kept[0])]
         nearest = "to the nearest point that it can reach"
@@ -368,7 +371,7 @@ class WayFinder:
         goal: Point,
         people: Array,
         around: Array,
-        stamps: _Stamps,
+        stamps: Stamps,
         walks: Cells,
     ) -> list[Way]:
         """Distinct ways on the map `m` among `people`; those in the rows `walks` of `stamps` walk."""
@@ -381,8 +384,8 @@ class WayFinder:
         ends = np.array(goal)[None] if self._is_reached else np.zeros((0, 2))
         dt = 1.2 * m.cell / v_max  # between a step along an axis and a diagonal one
         times: Array = dt * np.arange(1.0, ceil(SEARCH_TIME / dt) + 1)
-        prices = np.zeros((len(times), *far.shape))
-        stamps.add(prices, walks, times, m.corner + low * m.cell)
+        corner = m.corner + low * m.cell
+        prices = stamps.find_prices(walks, times, corner, far.shape)
         if not prices.any() and not m.price[window].any():
             points = np.vstack([at, m.descend(start)[1:], ends])
             if len(ends) and m.sees(points[0], ends, ~m.free)[0]:
@@ -393,10 +396,11 @@ class WayFinder:
         end = np.array(m.end) - low
         if (end >= 0).all() and (end < far.shape).all():
             costs[:, end[0], end[1]] = 0.0  # a robot at its goal may stay there
-        ways, again = list[Way](), np.zeros(far.shape, np.float32)
+        ways, turns = list[Way](), list[Array]()
+        again = np.zeros(far.shape, np.float32)
         tube = np.ones(2 * [2 * int(_NEAR_WAY / m.cell) + 1])
         while len(ways) < MOST_WAYS:
-            cells = _cross_layers(costs + again, begin, far)
+            cells = cross_layers(costs + again, begin, far)
             k, then = len(cells) - 1, cells[-1]
             rest = m.descend(low + then)[1:]
             points = np.vstack([at, m.centers(low + cells[1:]), rest, ends])
@@ -404,23 +408,24 @@ class WayFinder:
             late = begun[-1] + _time(points[k:], v_max)[1:]
             within = costs[np.arange(k), *cells[1:].T].sum()
             way = Way(points, np.concatenate([begun, late]), float(within + far[*then]))
-            way = way._replace(cost=way.cost + self._price_sides(way, people))
-            if any(not _differ(way, each, around) for each in ways):
+            turns.append(_find_turns(way, around))
+            if not all(_differ(turns[-1], each) for each in turns[:-1]):
                 break
-            ways.append(way)
+            price = self._price_sides(way, people, turns[-1][: len(people)])
+            ways.append(way._replace(cost=way.cost + price))
             used = np.zeros(far.shape, bool)
             used[*cells.T] = np.hypot(*(cells - begin).T) * m.cell > 2 * _NEAR_WAY
             again += np.float32(dt * REPEAT_SECOND) * binary_dilation(used, tube)
         return ways
 
-    def _price_sides(self, way: Way, people: Array) -> float:
-        """Price of a `way` that meets `people` head-on, and passes on the side that is not preferred [s]."""
+    def _price_sides(self, way: Way, people: Array, turns: Array) -> float:
+        """Price of a `way` that meets `people` head-on, and `turns` to the side that is not preferred [s]."""
         x, y = way.points[-1] - way.points[0]
         vx, vy = (people[:, 1] - people[:, 0]).T / _TICK
         share = self._s.head_on_share * np.hypot(vx, vy) * np.hypot(x, y)
         meets = (np.abs(x * vy - y * vx) <= share) & (x * vx + y * vy <= 0)
         sign = 1 if self._s.pass_side == "right" else -1
-        is_other = sign * _find_turns(way, people) < -pi / 2
+        is_other = sign * turns < -pi / 2
         return SIDE_PRICE * bool((meets & is_other).any())
 
     def _find_target(
@@ -460,13 +465,12 @@ def _find_turns(way: Way, around: Array) -> Array:
     return np.asarray(((turns + pi) % (2 * pi) - pi).sum(axis=1))
 
 
-def _differ(a: Way, b: Way, around: Array) -> bool:
-    """True if the ways `a` and `b` are distinct, by what is `around` them."""
-    turns = _find_turns(a, around) - _find_turns(b, around)
-    return bool((np.abs(turns) > pi).any())
+def _differ(turns: Array, others: Array) -> bool:
+    """True if two ways are distinct, by their turns."""
+    return bool((np.abs(turns - others) > pi).any())
 
 
-class _Stamps:
+class Stamps:
     """Prices of cells around each person, and between two who stand or walk together.
 
     Parameters
@@ -501,16 +505,18 @@ class _Stamps:
         i, j = np.triu_indices(zones.size, 1)
         apart = np.hypot(*(at[i] - at[j]).T)
         differ = np.hypot(*(velocity[i] - velocity[j]).T)
-        named = [each for each in dict.fromkeys(groups) if each is not None]
-        group = np.array([named.index(e) if e in named else -1 for e in groups])
+        is_named = np.array([each is not None for each in groups])
+        pairs = combinations(groups, 2)  # in the order of `i` and `j`
+        is_same = [one == other for one, other in pairs]
         together = np.where(
-            (group[i] >= 0) & (group[j] >= 0),
-            (group[i] == group[j]) & (apart < _GROUP_REACH),
+            is_named[i] & is_named[j],
+            np.array(is_same, bool) & (apart < _GROUP_REACH),
             (apart < GROUP_DISTANCE) & (differ < GROUP_SPEED),
         )
         self._pairs = i[together], j[together]
         between = np.hypot(x, y) < apart[together, None, None] / 2
-        self._prices = np.concatenate([prices, GROUP_SECOND * between])
+        found = np.concatenate([prices, GROUP_SECOND * between])
+        self._prices = found.astype(np.float32)
 
     def find_places(self, times: Array) -> Array:
         """Places of people, and of the middles of pairs, at these `times`, shape (n, k, 2) [m]."""
@@ -520,23 +526,26 @@ class _Stamps:
         i, j = self._pairs
         return np.concatenate([people, (people[i] + people[j]) / 2])
 
-    def add(self, prices: Array, rows: Cells, times: Array, corner: Array) -> None:
-        """Add the `prices` of the people in these `rows`, at each of these `times`, shape (times, nx, ny).
+    def find_prices(
+        self, rows: Cells, times: Array, corner: Array, shape: tuple[int, ...]
+    ) -> Array:
+        """Prices of the people in these `rows`, at each of these `times`, shape (times, nx, ny).
 
-        The `corner` is that of the first cell [m]. Where people overlap, the higher price counts.
+        The `corner` is that of the first cell [m], of so many as `shape` says. Where people overlap, the
+        higher price counts.
         """
+        n = self._prices.shape[1] if len(rows) else 1
+        prices = np.zeros((len(times), *(size + 2 * n for size in shape)), np.float32)
         cells = np.floor((self.find_places(times) - corner) / self._cell).astype(int)
+        first = (cells - n // 2 + n).clip(0, np.add(shape, n))
         for row in rows:
-            stamp = self._prices[row]
-            first = cells[row] - len(stamp) // 2
-            for layer, (i, j) in zip(prices, first.tolist(), strict=True):
-                part = layer[max(i, 0) : max(i + len(stamp), 0)]
-                part = part[:, max(j, 0) : max(j + len(stamp), 0)]
-                own = stamp[max(-i, 0) :, max(-j, 0) :][: len(part), : part.shape[1]]
-                np.maximum(part, own, out=part)
+            for layer, (i, j) in zip(prices, first[row].tolist(), strict=True):
+                part = layer[i : i + n, j : j + n]
+                np.maximum(part, self._prices[row], out=part)
+        return np.asarray(prices[:, n:-n, n:-n], float)
 
 
-def _cross_layers(costs: Any, begin: Any, far: Array) -> Array:
+def cross_layers(costs: Any, begin: Any, far: Array) -> Array:
     """Cells of the cheapest way through layers of `costs`, one in each, shape (k + 1, 2).
 
     It begins in the cell `begin`, and ends in the last layer, or in any at the edge: where its cost and `far`
@@ -664,9 +673,10 @@ def find_target(
     """
     # complex numbers: the conjugate of u times v has the angle from u to v
     s, at, end = settings, complex(*position), complex(*goal)
-    way, nearest, target = end - at, inf, end
+    way, nearest, target, margin = end - at, inf, end, s.r_robot + s.eps
     for zone in zones if way and s.head_on_share else ():
-        velocity, h = complex(*zone[7:9]), _find_h(zone, position, s)
+        velocity = complex(*zone[7:9])
+        h = Zone.distance(*position, 0.0, *zone) - margin
         across = abs((way.conjugate() * velocity).imag)
         closing = (s.v_max + abs(velocity)) * s.dt
         reach = max(closing / s.gamma, closing * sum(s.step_lengths))
@@ -675,12 +685,13 @@ def find_target(
         if not is_head_on or h > min(nearest, abs(way), reach) or not a * b:
             continue
         nearest, target = h, end
-        semi_axis = zone[4] + s.r_robot + s.eps  # of the set h < 0
+        semi_axis = zone[4] + margin  # of the set h < 0
         cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
         w = acos(max(-1.0, min(1.0, cosine))) / 2
         bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
-        stands_on = abs(velocity) < STANDING_SPEED and _find_h(zone, goal, s) < 0
-        if not w or stands_on:
+        if not w or (
+            abs(velocity) < STANDING_SPEED and Zone.distance(*goal, 0.0, *zone) < margin
+        ):
             continue
         for side in (1, -1) if s.pass_side == "left" else (-1, 1):
             lead = side * bearing / (s.head_on_share * w)
@@ -696,8 +707,3 @@ def find_target(
                 target = at + way * rect(1.0, turn)
                 break
     return target.real, target.imag
-
-
-def _find_h(zone: Sequence[float], point: Point, s: MPCSettings) -> float:
-    """h of a `zone` at a `point` [m]."""
-    return float(barrier(Zone.distance(*point, 0.0, *zone), s.r_robot, s.eps))

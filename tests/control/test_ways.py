@@ -23,11 +23,11 @@ from szlib.control.ways import (
     SWITCH_GAIN,
     ZONE_SECOND,
     Map,
+    Stamps,
     Way,
     WayFinder,
-    _choose_cell,
-    _cross_layers,
-    _Stamps,
+    choose_cell,
+    cross_layers,
     find_target,
 )
 from szlib.core.checks import Array
@@ -72,7 +72,7 @@ def find_route(start: Any, goal: Any, walls: Any, clearance: float) -> Array:
     c, segments = max(clearance, 0.06), read_walls(walls)
     lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
     group = Group(Wall, segments.reshape(-1, 4), c + c**2 / lengths)
-    found = Map(Obstacles((group,), c), np.array([start, goal]), _choose_cell(c))
+    found = Map(Obstacles((group,), c), np.array([start, goal]), choose_cell(c))
     if not found.measure(start, goal, 1.0, np.zeros(found.shape)):
         return np.zeros((0, 2))
     return np.vstack([start, found.descend(found.find_cell(start))[1:-1], goal])
@@ -399,7 +399,7 @@ def test_the_search_finds_the_cheapest_way_of_all() -> None:
         graph = coo_array((price, (start, end)), shape=(240, 240)).tocsr()
         reached = dijkstra(graph, indices=number[0, 2, 3])[number] + far
         reached[:-1, 1:-1, 1:-1] = np.inf  # inside it goes on to the end
-        cells = _cross_layers(costs.astype(np.float32), begin, far)
+        cells = cross_layers(costs.astype(np.float32), begin, far)
         moves = np.abs(np.diff(cells, axis=0))
         k = len(moves)
         found = costs[np.arange(k), *cells[1:].T].sum() + 0.015 * moves.sum()
@@ -519,13 +519,9 @@ def test_between_two_people_who_are_together_a_way_has_its_price(apart, rates) -
     zones = Obstacles.of(
         [Zone(*Zone.place(ROUND, p.position, 0.0, p.velocity)) for p in people], AMONG
     )
-    stamps, price = _Stamps(zones, [None, None], 0.1, AMONG), np.zeros((1, 60, 60))
-    stamps.add(
-        price,
-        np.arange(len(stamps.find_places(np.zeros(1)))),
-        np.array([2.0]),
-        np.array([-3.0, -3]),
-    )
+    stamps = Stamps(zones, [None, None], 0.1, AMONG)
+    rows = np.arange(len(stamps.find_places(np.zeros(1))))
+    price = stamps.find_prices(rows, np.array([2.0]), np.array([-3.0, -3]), (60, 60))
     places = -3.0 + 0.1 * (np.argwhere(price[0] == GROUP_SECOND) + 0.5)
     is_group = apart < GROUP_DISTANCE and abs(rates[0] - rates[1]) < GROUP_SPEED
     assert (
