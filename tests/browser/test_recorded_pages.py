@@ -1,21 +1,8 @@
 """The recorded laboratory in a real browser, from a file: no kernel, no network, wide and narrow screens."""
 
-from dataclasses import replace
-
-import numpy as np
 import pytest
-from laboratory import PRESETS, Axis, Recording, RobotOptions, World
-
-import szlib
-
-ZONE = szlib.Ellipse((0.03, 0.0), (0.97, 0.75))
-AXES = [Axis("gamma", "gamma", (0.05, 0.3)), Axis("y", "person at y [m]", (0.0, 0.5))]
-
-
-def make_world(gamma, y):
-    person = szlib.Person((0.0, y), heading=np.pi)
-    scene = replace(PRESETS["passing"], people=(person,))
-    return World(scene, ZONE, [RobotOptions(changes={"gamma": gamma})])
+from helpers.recorded_worlds import AXES, make_world
+from laboratory import Recording
 
 
 @pytest.fixture(scope="module")

@@ -6,23 +6,13 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.workbook import paper_sentences
 from szlib.workbook.report import write_report
 
 VERDICT = "undecided: no null model"
 WIDE, NARROW = (1300, 900), (390, 844)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def sentences_held_by_notebook_10():
-    """The claims that notebook 28 judges are here those of notebook 10."""
-    table = paper_sentences.load_sentences()
-    table["held_by"] = [
-        [name.replace("28: ", "10: ") for name in names] for names in table["held_by"]
-    ]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_sentences, "load_sentences", table.copy)
-        yield
+pytestmark = pytest.mark.usefixtures("sentences_held_by_notebook_10")
 
 
 @pytest.fixture(scope="module")

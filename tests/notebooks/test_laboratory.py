@@ -3,13 +3,13 @@
 import doctest
 import io
 import json
-from dataclasses import replace
 from threading import Thread
 
 import laboratory
 import numpy as np
 import pytest
 import shapely
+from helpers import recorded_worlds
 from laboratory import (
     PRESETS,
     Axis,
@@ -340,13 +340,8 @@ def test_a_scene_of_ones_own_is_opened():
 
 
 def test_a_recording_opens_the_laboratory_on_its_scene(monkeypatch):
-    def make(gamma, y):
-        person = szlib.Person((0.0, y), heading=np.pi)
-        scene = replace(PRESETS["passing"], people=(person,))
-        return World(scene, ZONE, [RobotOptions(changes={"gamma": gamma})])
-
     axes = [Axis("gamma", "gamma", (0.05, 0.3), 1), Axis("y", "y [m]", (0.5,))]
-    recording = Recording("Passing", make, axes, longest=0.2)
+    recording = Recording("Passing", recorded_worlds.make_world, axes, longest=0.2)
     assert recording.open_live() is None, "a headless run has no page"
     monkeypatch.setenv("JPY_SESSION_NAME", "chapter.ipynb")
     monkeypatch.delenv(folders.RUN_VARIABLE, raising=False)

@@ -5,24 +5,15 @@ import doctest
 import json
 import re
 import zlib
-from dataclasses import replace
 
 import laboratory
 import numpy as np
 import pytest
-from laboratory import PRESETS, Axis, Recording, RobotOptions, World, explain
+from helpers.recorded_worlds import AXES, make_world
+from laboratory import Recording, explain
 
 import szlib
 from szlib.workbook import folders
-
-ZONE = szlib.Ellipse((0.03, 0.0), (0.97, 0.75))
-AXES = [Axis("gamma", "gamma", (0.05, 0.3)), Axis("y", "person at y [m]", (0.0, 0.5))]
-
-
-def make_world(gamma, y):
-    person = szlib.Person((0.0, y), heading=np.pi)
-    scene = replace(PRESETS["passing"], people=(person,))
-    return World(scene, ZONE, [RobotOptions(changes={"gamma": gamma})])
 
 
 @pytest.fixture(scope="module")

@@ -26,12 +26,6 @@ import matplotlib.pyplot as plt
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 @pytest.fixture(scope="module")
 def log():
     scenario = szlib.SCENARIOS["corridor"]

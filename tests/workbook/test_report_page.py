@@ -9,7 +9,6 @@ import pytest
 from bs4 import BeautifulSoup
 
 import szlib
-from szlib.workbook import paper_sentences
 from szlib.workbook.folders import NOTEBOOKS
 from szlib.workbook.record import PAPER, parameters
 from szlib.workbook.record.display import format_value
@@ -44,16 +43,7 @@ def parse(report):
     return BeautifulSoup(report.read_text(encoding="utf-8"), "html.parser")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def sentences_held_by_notebook_10():
-    """The claims that notebook 28 judges are here those of notebook 10."""
-    table = paper_sentences.load_sentences()
-    table["held_by"] = [
-        [name.replace("28: ", "10: ") for name in names] for names in table["held_by"]
-    ]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_sentences, "load_sentences", table.copy)
-        yield
+pytestmark = pytest.mark.usefixtures("sentences_held_by_notebook_10")
 
 
 @pytest.fixture(scope="module")
