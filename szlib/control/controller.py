@@ -60,7 +60,6 @@ def advance(state: Array, control: Array, dt: float) -> Array:
 
 
 _MOST_PIECES = 64  # in which the way of a braking robot is looked at
-ROUNDING = 1e-9  # a slower robot is at rest, but for rounding [m/s]
 
 
 def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -> Path:
@@ -74,26 +73,21 @@ def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -
     control : (ax, ay) [m/s2].
     s : settings: dt and a_max.
     """
-    (x, y, vx, vy), (ax, ay), dt = state, control.tolist(), s.dt
-    dx, dy, bow = dt * vx + dt**2 / 2 * ax, dt * vy + dt**2 / 2 * ay, dt**2 / 8
-    points, vx, vy = [(x, y), (x + dx, y + dy)], vx + dt * ax, vy + dt * ay
-    x, y, fastest, way = x + dx, y + dy, max(abs(vx), abs(vy)), 0.0
+    now, dt = np.array(state), s.dt
+    after = advance(now, control, dt)
+    way, velocity = after[:2] - now[:2], after[2:]
+    fastest = float(np.abs(velocity).max())
     steps = ceil(fastest / s.a_max / dt)
     piece = dt * max(1, ceil(steps / _MOST_PIECES))
-    speed, times = fastest, [0.0, dt]
-    while speed > ROUNDING:
-        slower = max(0.0, speed - s.a_max * piece)
-        way += piece * (speed + slower) / 2 / fastest
-        points.append((x + way * vx, y + way * vy))
-        times.append(times[-1] + piece)
-        speed = slower
-    bows, asides = np.zeros((2, len(points) - 1))
-    bows[:] = 2**0.5 * s.a_max * piece**2 / 8
-    bows[0] = hypot(ax, ay) * bow
-    asides[0] = bow * abs(dx * ay - dy * ax) / (hypot(dx, dy) or 1.0)
-    return Path(
-        np.array(points), np.linspace(0.0, dt * len(bows), len(points)), bows, asides
-    )
+    times = piece * np.arange(ceil(fastest / s.a_max / piece) + 1)
+    speeds = (fastest - s.a_max * times).clip(0.0)
+    gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / (fastest or 1.0)
+    points = np.vstack([now[:2], after[:2], after[:2] + gone[:, None] * velocity])
+    bows = np.full(len(gone) + 1, 2**0.5 * s.a_max * piece**2 / 8)
+    bows[0] = hypot(*control) * dt**2 / 8
+    sideways = abs(way[0] * control[1] - way[1] * control[0]) / (hypot(*way) or 1.0)
+    asides = np.append(sideways * dt**2 / 8, np.zeros(len(gone)))
+    return Path(points, np.append(0.0, dt + times), bows, asides)
 
 
 class DoubleIntegrator:

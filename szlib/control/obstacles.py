@@ -206,7 +206,7 @@ class Obstacle:
     Notes
     -----
     `distance` must be convex along straight lines, also if the obstacle moves, and must not change by more
-    than the robot and the obstacle move; else write `bound_way`.
+    than the robot and the obstacle move.
 
     Examples
     --------
@@ -253,13 +253,6 @@ class Obstacle:
     @classmethod
     def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """Euclidean distance to what the robot would touch [m]; by default, and for parameters, see
-        `Obstacle.distance`.
-        """
-        return cls.distance(x, y, t, *numbers)
-
-    @classmethod
-    def bound_way(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
-        """A lower bound of the way to the obstacle [m]; by default, and for parameters, see
         `Obstacle.distance`.
         """
         return cls.distance(x, y, t, *numbers)
@@ -418,18 +411,6 @@ class Wall(Obstacle):
     def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """Euclidean distance to the segment; parameters as of `Obstacle.distance`."""
         return euclidean_segment_formula(x, y, *numbers)
-
-    @classmethod
-    def bound_way(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
-        """The way s; parameters as of `Obstacle.distance`.
-
-        With d the approximate distance to a wall of length L, s = L/2 (sqrt(1 + 4 d/L) - 1), so that d = F(s)
-        = s + s^2/L. It changes by no more than the robot moves (`szlib.control.differential_drive`).
-        """
-        xa, ya, xb, yb = numbers
-        length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
-        d = segment_formula(x, y, *numbers)
-        return length / 2 * ((1 + 4 * d / length) ** 0.5 - 1)
 
     def margin(self, settings: MPCSettings) -> float:
         """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""
@@ -638,19 +619,21 @@ class Obstacles(NamedTuple):
         return measure(points[:, 0], points[:, 1], times)
 
     def find_near(self, x: float, y: float, reach: float) -> list[int]:
-        """Places of the obstacles that are at most `reach` [m] away from (`x`, `y`) [m].
+        """Places of the obstacles whose way s may be at most `reach` from (`x`, `y`) [m].
 
         An obstacle with the velocity w can be left out while its way s >= r_robot + margin + (v + w) (T +
         dt/gamma), with the horizon T, and dt and gamma of the longest step: then its rows hold whatever a
-        robot does that is no faster than v. For a wall (`Wall.bound_way`), with S = r_robot + eps, and
-        r_robot + margin <= F(S),
+        robot does that is no faster than v. The way is the distance, but for a wall. With d the approximate
+        distance to a wall of length L, s = L/2 (sqrt(1 + 4 d/L) - 1), so that d = F(s) = s + s^2/L. It
+        changes by no more than the robot moves (`szlib.control.differential_drive`), and is at least 0.7
+        times the Euclidean distance. With S = r_robot + eps, and r_robot + margin <= F(S),
 
             gamma h(x_k) >= gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
                          >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
 
         A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m.
         """
-        return np.flatnonzero(self._collect("bound_way", x, y, 0.0) <= reach).tolist()
+        return np.flatnonzero(0.7 * self._collect("gap", x, y, 0.0) <= reach).tolist()
 
     def _collect(
         self, formula: str, x: Any, y: Any, t: Any, *, is_barrier: bool = False

@@ -123,14 +123,12 @@ def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
 
 def plan_along(s: MPCSettings, state: Sequence[float], points: Array) -> Array:
     """Inputs with which a robot in this `state` follows `points` at the times of `s`, shape (N, 2) [m/s2]."""
-    at, v, plan = np.array(state[:2]), np.array(state[2:]), list[Array]()
-    for point, length in zip(points[1:], s.step_lengths, strict=True):
+    at, v, plan = np.array(state[:2]), np.array(state[2:]), np.zeros((s.N, 2))
+    for k, length in enumerate(s.step_lengths):
         dt = s.dt * length
-        velocity = (point - at) / dt
-        velocity *= min(1.0, s.v_max / (hypot(*velocity) or 1.0))
-        plan.append(((velocity - v) / dt).clip(-s.a_max, s.a_max))
-        at, v = at + dt * v + dt**2 / 2 * plan[-1], v + dt * plan[-1]
-    return np.array(plan)
+        _approach(s, plan[k], v, (points[k + 1] - at) / dt, dt, s.v_max)
+        at, v = at + dt * v + dt**2 / 2 * plan[k], v + dt * plan[k]
+    return plan
 
 
 def limit_speed(s: MPCSettings, velocity: Sequence[float], inputs: Array) -> None:
@@ -138,16 +136,19 @@ def limit_speed(s: MPCSettings, velocity: Sequence[float], inputs: Array) -> Non
 
     A robot that is too fast now slows down as it can.
     """
-    now, time = np.array(velocity), 0.0
-    fastest = hypot(*velocity)
-    for control, length in zip(inputs, s.step_lengths, strict=True):
-        dt = s.dt * length
-        time += dt
-        after = now + dt * control
-        limit = max(s.v_max, fastest - s.a_max * time)
-        after *= min(1.0, limit / (hypot(*after) or 1.0))
-        control[:] = ((after - now) / dt).clip(-s.a_max, s.a_max)
-        now = now + dt * control
+    v, slowest = np.array(velocity), hypot(*velocity)
+    for control, length, time in zip(inputs, s.step_lengths, s.times[1:], strict=True):
+        dt, limit = s.dt * length, max(s.v_max, slowest - s.a_max * time)
+        _approach(s, control, v, v + dt * control, dt, limit)
+        v = v + dt * control
+
+
+def _approach(
+    s: MPCSettings, control: Array, v: Array, wanted: Array, dt: float, limit: float
+) -> None:
+    """Set the `control` that brings a robot from `v` nearest to the `wanted` velocity, up to a `limit`."""
+    wanted = wanted * min(1.0, limit / (hypot(*wanted) or 1.0))
+    control[:] = ((wanted - v) / dt).clip(-s.a_max, s.a_max)
 
 
 class Condition(NamedTuple):

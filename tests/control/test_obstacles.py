@@ -219,7 +219,7 @@ def test_h_of_a_table_of_obstacles_is_that_of_each_obstacle():
 def test_each_kind_has_one_formula_for_numbers_and_symbols():
     rng, symbols = np.random.default_rng(4), ca.SX.sym("xyt", 3)
     for each in some_of_each(rng):
-        for formula in (each.distance, each.gap, each.bound_way):
+        for formula in (each.distance, each.gap):
             value = ca.Function(
                 "f", [symbols], [formula(*ca.vertsplit(symbols), *each.numbers)]
             )
@@ -229,7 +229,7 @@ def test_each_kind_has_one_formula_for_numbers_and_symbols():
 
 
 def test_no_distance_changes_by_more_than_the_robot_and_the_obstacle_move():
-    """As `Obstacle` requires of `gap` and of `bound_way`, from which ways are bounded."""
+    """As `Obstacle` requires of `gap`, from which ways are bounded."""
     rng = np.random.default_rng(5)
     for _ in range(20):
         for each in some_of_each(rng):
@@ -237,11 +237,22 @@ def test_no_distance_changes_by_more_than_the_robot_and_the_obstacle_move():
             p, t = rng.uniform(-4, 4, (50, 2)), rng.uniform(0, 2, 50)
             q, later = p + rng.normal(0, 0.2, (50, 2)), t + rng.uniform(0, 0.3, 50)
             moved = np.hypot(*(q - p).T) + speed * (later - t)
-            for formula in (each.gap, each.bound_way):
-                change = formula(*q.T, later, *each.numbers) - formula(
-                    *p.T, t, *each.numbers
-                )
-                assert (np.abs(change) <= moved + 1e-9).all(), each
+            change = each.gap(*q.T, later, *each.numbers) - each.gap(
+                *p.T, t, *each.numbers
+            )
+            assert (np.abs(change) <= moved + 1e-9).all(), each
+
+
+@pytest.mark.parametrize("length", [1e-3, 0.1, 1.0, 10.0, 100.0])
+def test_the_way_to_a_wall_changes_with_the_robot_and_is_not_far_below_the_gap(length):
+    """As `Obstacles.find_near` proves of s, with d = s + s^2 / L."""
+    rng, ends = np.random.default_rng(6), (-length / 2, 0.0, length / 2, 0.0)
+    p = rng.normal(size=(20000, 2)) * (length + np.geomspace(1e-3, 50, 20000))[:, None]
+    q = p + rng.normal(0, 0.2, p.shape)
+    d = np.array([Wall.distance(*each.T, 0.0, *ends) for each in (p, q)])
+    s, moved = length / 2 * (np.sqrt(1 + 4 * d / length) - 1), q - p
+    assert (np.abs(s[1] - s[0]) <= np.hypot(*moved.T) + 1e-9).all()
+    assert (s[0] >= 0.7 * Wall.gap(*p.T, 0.0, *ends)).all()
 
 
 def test_a_zone_in_the_world_is_the_zone_placed_at_its_person():
