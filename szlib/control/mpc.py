@@ -284,15 +284,7 @@ class MPCCBF(Controller):
         heading = self._choose_heading(scene, route)
         remaining = heading.length if heading.length < inf else dist(x[:2], towards)
         self._planner.budget.begin(began)
-        status, plan = self._decide(scene, heading)
-        outlook, brakes = self._guard(scene, plan)
-        if brakes:
-            inputs = plan_braking(self._s, x[2:])
-            status, plan = "braking", plan._replace(inputs=inputs)
-        if clock.has_begun:
-            self._change = plan.inputs - self._plan
-        self._plan = plan.inputs
-        walls_safe, passively_safe = outlook.is_safe
+        status, plan, (walls_safe, passively_safe) = self._choose(scene, heading)
         step: Step = self._finish(
             control=plan.inputs[0].copy(),
             inputs=plan.inputs,
@@ -320,6 +312,20 @@ class MPCCBF(Controller):
             at = self._clock.bring_forward(self.robot, np.array(x), age, np.zeros(2))
             x = at.tolist()
         return list(x), goal
+
+    def _choose(
+        self, scene: Scene, heading: Heading
+    ) -> tuple[Status, Plan, tuple[bool, bool]]:
+        """The plan, or full braking, and what the guard says of it."""
+        status, plan = self._decide(scene, heading)
+        outlook, brakes = self._guard(scene, plan)
+        if brakes:
+            inputs = plan_braking(self._s, scene.state[2:])
+            status, plan = "braking", plan._replace(inputs=inputs)
+        if self._clock.has_begun:
+            self._change = plan.inputs - self._plan
+        self._plan = plan.inputs
+        return status, plan, outlook.is_safe
 
     def _finish(self, **found: Any) -> Any:
         """What the robot does, by what was `found`."""

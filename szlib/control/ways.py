@@ -673,37 +673,43 @@ def find_target(
     """
     # complex numbers: the conjugate of u times v has the angle from u to v
     s, at, end = settings, complex(*position), complex(*goal)
-    way, nearest, target, margin = end - at, inf, end, s.r_robot + s.eps
+    way, nearest, chosen, margin = end - at, inf, None, s.r_robot + s.eps
     for zone in zones if way and s.head_on_share else ():
         velocity = complex(*zone[7:9])
-        h = Zone.distance(*position, 0.0, *zone) - margin
         across = abs((way.conjugate() * velocity).imag)
+        if across > s.head_on_share * abs(velocity) * abs(way):
+            continue
+        h = Zone.distance(*position, 0.0, *zone) - margin
         closing = (s.v_max + abs(velocity)) * s.dt
         reach = max(closing / s.gamma, closing * sum(s.step_lengths))
-        a, b = complex(*zone[:2]) - at, complex(*zone[2:4]) - at
-        is_head_on = across <= s.head_on_share * abs(velocity) * abs(way)
-        if not is_head_on or h > min(nearest, abs(way), reach) or not a * b:
+        if h <= min(nearest, abs(way), reach):
+            nearest, chosen = h, zone
+    if chosen:
+        end = at + way * _turn_aside(at, end, chosen, fixed, s)
+    return end.real, end.imag
+
+
+def _turn_aside(
+    at: complex, end: complex, zone: Sequence[float], fixed: Obstacles, s: MPCSettings
+) -> complex:
+    """By what the way from `at` to the `end` is turned, to pass a person with this `zone`."""
+    way, semi_axis = end - at, zone[4] + s.r_robot + s.eps  # of the set h < 0
+    a, b = complex(*zone[:2]) - at, complex(*zone[2:4]) - at
+    is_on_goal = Zone.distance(end.real, end.imag, 0.0, *zone) < s.r_robot + s.eps
+    if not a * b or (is_on_goal and hypot(*zone[7:9]) < STANDING_SPEED):
+        return 1.0
+    cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
+    w = acos(max(-1.0, min(1.0, cosine))) / 2
+    bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
+    for side in (1, -1) if s.pass_side == "left" else (-1, 1):
+        lead = side * bearing / (s.head_on_share * w) if w else inf
+        if not -1 <= lead < 2:
             continue
-        nearest, target = h, end
-        semi_axis = zone[4] + margin  # of the set h < 0
-        cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
-        w = acos(max(-1.0, min(1.0, cosine))) / 2
-        bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
-        if not w or (
-            abs(velocity) < STANDING_SPEED and Zone.distance(*goal, 0.0, *zone) < margin
-        ):
-            continue
-        for side in (1, -1) if s.pass_side == "left" else (-1, 1):
-            lead = side * bearing / (s.head_on_share * w)
-            if not -1 <= lead < 2:
-                continue
-            # from the zone's centre to where the robot passes
-            beside = side * 1j * way / abs(way)
-            half = (a - b) / 2
-            width = sqrt(semi_axis**2 - (half.conjugate() * beside).imag ** 2)
-            points = at + (a + b) / 2 + width * beside * _ALONG
-            if (fixed.h(points.real, points.imag) >= 0).all():
-                turn = (side * w - bearing) * min(1.0, 2 - lead)
-                target = at + way * rect(1.0, turn)
-                break
-    return target.real, target.imag
+        # from the zone's centre to where the robot passes
+        beside = side * 1j * way / abs(way)
+        half = (a - b) / 2
+        width = sqrt(semi_axis**2 - (half.conjugate() * beside).imag ** 2)
+        points = at + (a + b) / 2 + width * beside * _ALONG
+        if (fixed.h(points.real, points.imag) >= 0).all():
+            return rect(1.0, (side * w - bearing) * min(1.0, 2 - lead))
+    return 1.0
