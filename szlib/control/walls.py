@@ -26,7 +26,6 @@ from .obstacles import SHORTEST_WALL
 _NUMBERS = {"origin": (3,), "resolution": (), "free_thresh": (), "occupied_thresh": ()}
 _EIGHT_BITS = "1", "L", "LA", "P", "PA", "RGB", "RGBA"
 _MOST_PIXELS = 50_000_000  # of a picture; a file of 10 MB may hold many more
-Circle = tuple[float, float, float]
 
 
 def read_walls(walls: Any) -> Array:
@@ -118,7 +117,6 @@ def walls_from_map(
     path: str | Path,
     *,
     simplify: float = 0.05,
-    near: Circle | None = None,
     unknown: bool = False,
 ) -> Walls:
     """Read the map of ROS map_server in the YAML file `path`: the outlines of what is occupied.
@@ -127,7 +125,7 @@ def walls_from_map(
     ----------
     path : the YAML file, with image (PGM or PNG), resolution, origin, occupied_thresh, free_thresh, and, if
         they differ from 0 and "trinary", negate and mode.
-    simplify, near : as of `walls_from_grid`.
+    simplify : as of `walls_from_grid`.
     unknown : True if unknown cells are solid as well.
 
     Returns
@@ -172,7 +170,7 @@ def walls_from_map(
     solid, unclear = _classify_pixels(*pixels, entries)
     cells = (solid | (unclear & unknown))[::-1]
     side, origin = entries["resolution"], entries["origin"]
-    return walls_from_grid(cells, float(side), origin, simplify=simplify, near=near)
+    return walls_from_grid(cells, float(side), origin, simplify=simplify)
 
 
 def _check_entries(given: Any) -> dict[str, Any]:
@@ -226,7 +224,6 @@ def walls_from_grid(
     origin: ArrayLike = (0.0, 0.0, 0.0),
     *,
     simplify: float = 0.05,
-    near: Circle | None = None,
 ) -> Walls:
     """Find the outlines of the occupied cells of a grid, as segments, shape (n, 2, 2) [m].
 
@@ -236,7 +233,6 @@ def walls_from_grid(
     resolution : side of a cell [m].
     origin : (x, y, yaw) of the outer corner of the first cell [m, rad].
     simplify : an outline may deviate by this much from that of the cells [m].
-    near : (x, y, r): keep walls within r of (x, y) only [m].
 
     Raises
     ------
@@ -266,9 +262,5 @@ def walls_from_grid(
     turn = [c, -s, s, c, x, y]
     solids = affine_transform(shapely.simplify(outlines, within / side), turn)
     walls = read_walls(solids).view(Walls)
-    if near is not None:
-        px, py, r = check_array("near", near, (3,)).tolist()
-        gaps = shapely.distance(shapely.linestrings(walls), shapely.Point(px, py))
-        walls = walls[gaps <= r]
     walls.solids = solids
     return walls

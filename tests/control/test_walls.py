@@ -124,14 +124,6 @@ def test_simplified_outlines_are_few_and_deviate_by_no_more_than_asked() -> None
     assert shapely.hausdorff_distance(cells, lines) < 0.05 + 1e-6
 
 
-def test_near_keeps_the_walls_within_a_radius() -> None:
-    grid = np.zeros((100, 100), bool)
-    grid[10:12, 10:12] = grid[80:82, 80:82] = True
-    assert len(walls_from_grid(grid, 0.1)) == 8
-    walls = walls_from_grid(grid, 0.1, near=(1.0, 1.0, 2.0))
-    assert len(walls) == 4 and walls.max() < 2
-
-
 BAD = {
     "resolution": ("resolution", {"resolution": None}),
     "negative": ("resolution must be a positive", {"resolution": -0.05}),
