@@ -14,6 +14,7 @@ import shapely
 
 import szlib
 from szlib.control import HalfPlane, advance
+from szlib.control.controller import find_stopping_path
 
 ZONE = szlib.Ellipse((-0.05, 0.017), (1.084, 0.625), -0.28)
 BODY = 0.25
@@ -286,3 +287,15 @@ def test_a_half_plane_belongs_to_the_promise() -> None:
             assert step.walls_safe
             assert ((way + 0.7 * normal) @ normal).min() >= 0.5 - 1e-6
             state = advance(state, step.control, 0.1)
+
+
+@pytest.mark.parametrize("a_max", [0.05, 0.3, 1.0])
+def test_a_stopping_path_is_passed_at_its_times(a_max):
+    """Also if it is looked at in pieces of several steps: people are where they are at these times."""
+    s = szlib.MPCSettings(a_max=a_max)
+    path = find_stopping_path((0.0, 0.0, 1.0, 0.0), np.array([-a_max, 0.0]), s)
+    t = path.times.clip(max=1.0 / a_max)
+    assert 1.0 / a_max <= path.times[-1] + 1e-9 < 1.1 / a_max + 0.2
+    expected = np.column_stack([t - a_max * t**2 / 2, 0 * t])
+    assert path.points == pytest.approx(expected, abs=path.bows.max())
+    assert path.points[:-1] == pytest.approx(expected[:-1], abs=1e-9)
