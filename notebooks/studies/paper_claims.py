@@ -174,8 +174,8 @@ def measure_shape(
             raise ZoneError(
                 f"{MIN_COMPARED} encounters of people who cross or come towards each other needed"
             )
-        best = zone_ellipses(estimator.best[None], (slow, speed, fast))
-        ellipses = np.vstack([best, estimator.posterior((slow, speed, fast)).values])
+        middle = zone_ellipses(estimator.middle[None], (slow, speed, fast))
+        ellipses = np.vstack([middle, estimator.posterior((slow, speed, fast)).values])
     except ZoneError as error:
         return [
             Finding(each, np.nan, np.nan, np.nan, unit, n, False, reason=str(error))

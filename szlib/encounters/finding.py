@@ -85,8 +85,8 @@ def find_encounters(
     sampled = (pairs[..., None] + np.arange(steps + 1)).reshape(2, -1)
     number = np.arange(len(ref)).repeat(steps + 1)
     samples = sample_rows(tracks, rows, number, *sampled)
-    counts = rows.within(area.grown(REACH))
-    samples["kind"] = kinds_of_pairs(rows.person[pairs], rows, counts)[number]
+    near = rows.select(rows.within(area.grown(REACH)))
+    samples["kind"] = kinds_of_pairs(rows.person[pairs], near)[number]
     samples.attrs |= {"area": str(area), "area_reason": area.reason}
     stages = [
         funnels.stage(

@@ -112,14 +112,12 @@ def find_units(rows: TrackRows, whole: np.ndarray) -> np.ndarray:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def kinds_of_pairs(
-    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray | bool = True
-) -> pd.Categorical:
-    """Decide the kinds of pairs of people from the `rows` that count (`counts`, one for each row, or all).
+def kinds_of_pairs(pairs: np.ndarray, rows: TrackRows) -> pd.Categorical:
+    """Decide the kinds of pairs of people from the `rows`.
 
     `pairs` are the numbers of the two people of each pair, (2, n).
     """
-    pair, both = _common_track(pairs, rows, counts)
+    pair, both = _common_track(pairs, rows)
     is_near = rows.distance(*both) <= NEAR
     is_equal = np.abs(np.diff(rows.velocity[both], axis=0)[0]) <= EQUAL_VELOCITY
     n = pairs.shape[1]
@@ -150,16 +148,14 @@ def classify_motion(
     turn = np.nan_to_num(rows.velocity[both[0]].conj() * rows.velocity[both[1]])
     along, across = (np.bincount(pair, part, n) for part in (turn.real, turn.imag))
     angle = np.abs(np.arctan2(across, along))
-    standing, same, opposite, crossing = range(1, len(KINDS))
     rules = [stands, angle <= ALONG, angle >= np.pi - ALONG]
-    return np.select(rules, [standing, same, opposite], crossing)
+    # standing, same direction, opposite, else crossing
+    return np.select(rules, [1, 2, 3], 4)
 
 
-def _common_track(
-    pairs: np.ndarray, rows: TrackRows, counts: np.ndarray | bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Every tick at which the rows of both people of a pair count: the pair's number, and the two rows."""
-    row = np.flatnonzero(counts & np.isin(rows.person, pairs))
+def _common_track(pairs: np.ndarray, rows: TrackRows) -> tuple[np.ndarray, np.ndarray]:
+    """Every tick at which both people of a pair have a row: the pair's number, and the two rows."""
+    row = np.flatnonzero(np.isin(rows.person, pairs))
     a = pd.DataFrame({"one": rows.person[row], "tick": rows.tick[row], "a": row})
     b = a.rename(columns={"one": "other", "a": "b"})
     both = pd.DataFrame(pairs.T, columns=["one", "other"]).reset_index(names="pair")

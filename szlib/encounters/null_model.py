@@ -228,8 +228,8 @@ def null_encounters(
         close = funnels.select(samples, is_near, "samples: close", far)
         return close, nearest.reset_index()
 
-    drawn_by = {"shifts": shifts, "seed": seed, "minutes": list(minutes)}
-    parameters = {"moved": "units", **drawn_by, **settings.as_json()}
+    parameters = {"moved": "units", "seed": seed, "minutes": list(minutes)}
+    parameters |= settings.as_json()
     null = _search(find, shifts, r_max, parameters, crowd.sensor, progress)
     return null.of_kind(kinds)
 
@@ -279,20 +279,15 @@ def null_pairs(
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Samples and pairs of a `shift`."""
         met = crowd.meet(r_max, _draw(seconds, minutes, rng))
-        counted = stored = met.compared
-        if len(counted) > (quota := -(-_STORED // shifts)):
-            stored = np.sort(rng.choice(counted, quota, replace=False))
+        counted = met.compared
+        size = min(len(counted), -(-_STORED // shifts))
+        stored = np.sort(rng.choice(counted, size, replace=False))
         kind, nearest = name_kinds(met.kind[counted]), met.nearest[counted]
         every = pd.DataFrame({"encounter": counted, "kind": kind, "nearest": nearest})
         return crowd.sample(tracks, met, stored, r_max), every
 
-    drawn_by = {"shifts": shifts, "seed": seed, "minutes": list(minutes)}
-    parameters = {
-        "moved": "streams",
-        **drawn_by,
-        "kinds": list(COMPARED),
-        "area": str(place),
-    }
+    parameters = {"moved": "streams", "seed": seed, "minutes": list(minutes)}
+    parameters |= {"kinds": list(COMPARED), "area": str(place)}
     return _search(find, shifts, r_max, parameters, crowd.sensor, progress)
 
 
@@ -325,6 +320,6 @@ def _search(
         pd.concat(all_encounters, ignore_index=True),
         shifts,
         float(r_max),
-        parameters,
+        {"shifts": shifts, **parameters},
         sensor,
     )

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import cKDTree
 
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, clock_index
 from .geometry import Area, AttentionalSpace
@@ -19,27 +18,33 @@ _AT_ONCE = 500_000  # rows searched at a time
 def find_neighbours(
     place: np.ndarray, moment: np.ndarray, reach: float
 ) -> Iterator[np.ndarray]:
-    """Yield blocks of pairs of rows at one moment that are at most `reach` [m] apart, each pair once.
+    """Yield blocks of pairs of rows at one moment, at most `reach` [m] apart along both axes, each once.
 
     Parameters
     ----------
     place : positions x + iy, shape (n,) [m].
     moment : number of the moment of each row, shape (n,).
-    reach : largest distance [m].
+    reach : largest distance along an axis [m].
 
     Yields
     ------
     The rows of the two people of each pair, shape (2, n).
     """
-    order = np.argsort(moment, kind="stable")
-    # A block begins where a moment does.
-    cuts = np.searchsorted(moment[order], moment[order][::_AT_ONCE])
-    for rows in np.split(order, np.unique(cuts)[1:]):
-        # Two moments are farther apart than the reach, along a third axis.
-        since = 10 * reach * (moment[rows] - moment[rows].min(initial=0))
-        points = np.column_stack([place[rows].real, place[rows].imag, since])
-        tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
-        yield rows[tree.query_pairs(reach, output_type="ndarray").T]
+    if len(place) == 0:
+        return
+    # All moments one after the other on a line, farther apart than the reach.
+    length = np.ptp(place.real) + 2 * reach
+    along = place.real + length * (moment - moment.min())
+    order = np.argsort(along)
+    along, across = along[order], place.imag[order]
+    last = np.searchsorted(along, along + reach, side="right")
+    for rows in np.array_split(np.arange(len(order)), 1 + len(order) // _AT_ONCE):
+        count = last[rows] - rows - 1
+        one = np.repeat(rows, count)
+        skipped = np.repeat(last[rows] - np.cumsum(count), count)
+        other = np.arange(len(one)) + skipped
+        is_near = np.abs(across[other] - across[one]) <= reach
+        yield order[[one[is_near], other[is_near]]]
 
 
 def firsts(numbers: np.ndarray) -> np.ndarray:

@@ -63,6 +63,7 @@ _STANDING = KINDS.index(STANDING)
 SECTORS = 8  # streams of a day, by direction of travel
 _OFFSETS = np.radians(np.arange(0, 45, 5))  # of the borders of the sectors
 _MARGIN = 1.75  # way that two people close in half a second, at 3.5 m/s [m]
+_TURN = 0.5  # by which two people who turn come nearer within a second [m]
 # Steps of the clock around each whole second at which two people are measured.
 _AROUND = np.arange(-TICKS_PER_SECOND, TICKS_PER_SECOND + 1)
 # People this far outside of the area may be in it at the next whole second [m].
@@ -113,17 +114,6 @@ def find_pairs(
     return of_kind(funnels.attach(samples, funnels.get(tracks)), kinds)
 
 
-def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
-    """How many pairs of `tracks` in an `area` are compared with chance, and what they say of the sensor."""
-    crowd = Crowd.from_tracks(tracks, area)
-    resolved = crowd.sensor.resolved
-    loses = f"loses people who are nearer than {resolved:.1f} m to each other"
-    return (
-        f"pairs who come towards each other or cross, within {CLOSE:g} m: {len(crowd.close.compared):,}\n"
-        f"sensor: it {loses if resolved else 'resolves people at every distance'}: {crowd.sensor}"
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Meetings:
     """Pairs of people who come near each other.
@@ -147,8 +137,7 @@ class Meetings:
     @property
     def compared(self) -> np.ndarray:
         """Numbers of the pairs of the kinds compared."""
-        codes = [KINDS.index(kind) for kind in COMPARED]
-        return np.flatnonzero(np.isin(self.kind, codes))
+        return np.flatnonzero(np.isin(self.kind, list(map(KINDS.index, COMPARED))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,8 +181,8 @@ class Crowd:
     def stream(self) -> np.ndarray:
         """Number of the stream of each person; each day has its own."""
         rows, unit = self.rows, self.unit[self.rows.person]
-        ways = (np.bincount(unit, v) for v in (rows.velocity.real, rows.velocity.imag))
-        heading = np.arctan2(*reversed(list(ways)))
+        along, across = rows.velocity.real, rows.velocity.imag
+        heading = np.arctan2(np.bincount(unit, across), np.bincount(unit, along))
         width = 2 * np.pi / SECTORS
         from_border = np.abs(((heading[:, None] - _OFFSETS) / width + 0.5) % 1 - 0.5)
         offset = _OFFSETS[np.argmin((from_border < 0.15).sum(axis=0))]
@@ -233,9 +222,11 @@ class Crowd:
             second = (second + shifts[group[rows.person]]) % period[rows.day]
         moment = rows.day * period.max() + second
         found = find_neighbours(rows.place, moment, r_max + _MARGIN)
-        # Rows are in the order of people.
-        near = np.sort(self.coarse[np.concatenate(list(found), axis=1)], axis=0)
-        near = near[:, np.diff(group[self.rows.person[near]], axis=0)[0] != 0]
+        pairs = np.concatenate(list(found), axis=1)
+        pairs = pairs[:, np.diff(group[rows.person][pairs], axis=0)[0] != 0]
+        # Who has just come into the area may have been nearer nearly a second ago.
+        pairs = pairs[:, _likely_nearest(rows, pairs, 1.0) < r_max + _TURN]
+        near = np.sort(self.coarse[pairs], axis=0)  # rows are in the order of people
         one, other = self.rows.person[near]
         key = one * np.int64(len(group)) + other
         order = np.argsort(key * len(self.rows) + near[0])
@@ -288,11 +279,8 @@ class Crowd:
         self, near: np.ndarray, of_pair: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of each pair: its rows where it is nearest (2, n), the distance [m], and the position in `near`."""
-        rows, (a, b) = self.rows, near
-        apart, relative = (v[b] - v[a] for v in (rows.place, rows.velocity))
-        time = -(apart * relative.conj()).real / np.maximum(np.abs(relative) ** 2, 1e-9)
-        time = np.clip(time, -0.5, 0.5)
-        likely = np.abs(apart + time * relative)
+        rows = self.rows
+        likely = _likely_nearest(rows, near, 0.5)
         likely += np.where(self.inside[near].all(axis=0), 0.0, 2 * REACH)
         least = np.minimum.reduceat(likely, firsts(of_pair))
         at = np.flatnonzero(likely == least[of_pair])
@@ -318,3 +306,10 @@ class Crowd:
         close = near[:, self.rows.distance(*near) < r_max]
         around = np.bincount(close.ravel(), minlength=len(self.rows))
         return np.asarray(np.maximum(around[near[:, at]].max(axis=0) - 1, 0))
+
+
+def _likely_nearest(rows: TrackRows, pairs: np.ndarray, seconds: float) -> np.ndarray:
+    """Nearest approach of `pairs` of rows (2, n) within so many `seconds`, if both people walk on [m]."""
+    apart, relative = (v[pairs[1]] - v[pairs[0]] for v in (rows.place, rows.velocity))
+    time = -(apart * relative.conj()).real / np.maximum(np.abs(relative) ** 2, 1e-9)
+    return np.asarray(np.abs(apart + np.clip(time, -seconds, seconds) * relative))

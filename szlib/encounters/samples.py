@@ -28,18 +28,19 @@ def sample_rows(
     The time is that of the reference pedestrian: in a shifted crowd they differ.
     """
     days = tracks["day"].astype("category")
-    ids = tracks["id"].to_numpy()[rows.order]
-    seen, heading = rows.place[other] - rows.place[ref], np.angle(rows.velocity)
+    at, ids = rows.order[ref], tracks["id"].to_numpy()
+    seen = rows.place[other] - rows.place[ref]
+    heading, other_heading = (np.angle(rows.velocity[each]) for each in (ref, other))
     columns = [
         encounter,
-        days.iloc[rows.order[ref]].array,
-        ids[ref],
-        ids[other],
+        days.iloc[at].array,
+        ids[at],
+        ids[rows.order[other]],
         rows.tick[ref] / TICKS_PER_SECOND,
-        wrap_angle(np.angle(seen) - heading[ref]),
+        wrap_angle(np.angle(seen) - heading),
         np.abs(seen),
         rows.speed[ref],
-        wrap_angle(np.angle(-seen) - heading[other]),
+        wrap_angle(np.angle(-seen) - other_heading),
         rows.speed[other],
     ]
     return pd.DataFrame(dict(zip(SAMPLE_COLUMNS, columns, strict=True)))

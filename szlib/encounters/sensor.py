@@ -90,7 +90,8 @@ class SensorCheck:
         return self.resolved > 0
 
     def __str__(self) -> str:
-        ends = noise = passes = ""
+        ends, noise = "no track ends inside the area", "no error of positions was found"
+        passes = f"no two people pass within {NEAR_END:g} m"
         if self.ends:
             ends = (
                 f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
@@ -105,13 +106,7 @@ class SensorCheck:
                 f"{self.exchanged:,} of {self.passes:,} pairs who pass within {NEAR_END:g} m "
                 f"({low:.0%} to {high:.0%}) look exchanged"
             )
-        return "; ".join(
-            [
-                ends or "no track ends inside the area",
-                noise or "no error of positions was found",
-                passes or f"no two people pass within {NEAR_END:g} m",
-            ]
-        )
+        return f"{ends}; {noise}; {passes}"
 
 
 def count_ends(

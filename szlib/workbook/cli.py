@@ -35,6 +35,9 @@ from ..core.errors import DataError, DataWarning, SzlibError
 from ..core.input_files import printable
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from ..encounters.geometry import Area
     from ..tracks.recipe import Recipe
 
 _STOPPED = "stopped; finished results stay in their folder"
@@ -206,12 +209,24 @@ def _notebooks(options: argparse.Namespace) -> int:
     return 0
 
 
+def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
+    """How many pairs of `tracks` in an `area` are compared with chance, and what they say of the sensor."""
+    from ..encounters.pairs import CLOSE, Crowd
+
+    crowd = Crowd.from_tracks(tracks, area)
+    resolved = crowd.sensor.resolved
+    loses = f"loses people who are nearer than {resolved:.1f} m to each other"
+    return (
+        f"pairs who come towards each other or cross, within {CLOSE:g} m: {len(crowd.close.compared):,}\n"
+        f"sensor: it {loses if resolved else 'resolves people at every distance'}: {crowd.sensor}"
+    )
+
+
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
     from .. import EncounterSettings, find_encounters
     from ..encounters.days import read_for_encounters
     from ..encounters.finding import find_place
-    from ..encounters.pairs import describe_pairs
     from ..tracks import datasets, funnels
     from ..tracks.readers import describe_file
     from ..tracks.recipe import COMMAND_VARIABLE, FILE_NAME

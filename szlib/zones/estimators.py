@@ -50,9 +50,8 @@ class Estimator(ABC):
     def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
         """Fit the zone to all encounters at `speeds`, ascending [m/s]."""
 
-    @abstractmethod
     def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
-        """Fit ellipses to weighted encounters.
+        """Fit ellipses to weighted encounters; an estimator with a posterior needs not.
 
         Parameters
         ----------
@@ -63,6 +62,7 @@ class Estimator(ABC):
         -------
         Ellipses (k, s, 5): centre, semi-axes [m] and angle [rad]; NaN where there is no zone.
         """
+        raise NotImplementedError
 
     def posterior(self, speeds: Sequence[float]) -> Draws | None:
         """Draws of ellipses at `speeds`, values (k, s, 5) as from `refit`; None: there is no posterior."""

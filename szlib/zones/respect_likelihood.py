@@ -57,11 +57,11 @@ _REPORTED = 9  # the ellipse, and the share f of careless people
 # Spread of the first draws, as a share of the bounds: the data tells the ellipse better than f, w, A and c.
 _FIRST_SPREAD = np.repeat([0.02, 0.15, 0.05], [8, 1, 3])
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
+_NEWTON, _EXACT = 30, 1e-5  # steps of its logarithm to the mean of g, and the last one
 _BANK = 24  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
 # number of best circles tried, and the least difference of their radii [m]
 _STARTS, _START_GAP = 3, 0.15
-_RESTARTS = 20
 # How far back the centre is moved to look for another peak [m], and the least gain in log density for which
 # it is moved on.
 _BACK, _GAIN = ((-0.15, -0.1, -0.05, 0.05, 0.1, 0.15), 0.5)
@@ -232,19 +232,41 @@ def _minus_log_prior(p: Array) -> tuple[float, Array]:
     return float((deviation**2).sum() + elongation**2) / 2, gradient
 
 
+def chance_level(g: Array, g_null: Array) -> tuple[float, float]:
+    """The mean of g over people who ignore each other, and the log likelihood ratio against g = 1.
+
+    Parameters
+    ----------
+    g, g_null : g(h) of the encounters of the data (n,) and of the null model (m,), of one kind.
+
+    Both are samples: an encounter of the data has the density N(h) g(h) / mean, one of the null model N(h).
+    The likelihood is maximised over all distributions N on the encounters seen, and over the mean (Qin,
+    Biometrika 85, 1998): it is that of a logistic regression that tells data from null model.
+    """
+    n, m = len(g), len(g_null)
+    both, level = np.concatenate([g, g_null]), g_null.mean()
+    for _ in range(_NEWTON):
+        share = both / (both + m / n * level)
+        step = (share.sum() - n) / np.maximum(share @ (1 - share), 1e-9)
+        level *= np.exp(np.clip(step, -2, 2))
+        if abs(step) < _EXACT:
+            break
+    ratio = both / level
+    log_ratio = np.log(ratio[:n]).sum() - np.log((m + n * ratio) / (m + n)).sum()
+    return float(level), float(log_ratio)
+
+
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """The likelihood of weighted encounters of the data, given those of the null model.
+    """The likelihood of the encounters of data and null model.
 
     Parameters
     ----------
     data, null : the encounters.
-    weights : of the encounters of the data, shape (k,).
     """
 
     data: PairPaths
     null: PairPaths
-    weights: Array
 
     @cached_property
     def kinds(self) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
@@ -257,37 +279,35 @@ class Likelihood:
 
         `h` and `h_null` are the distances of the encounters of data and null model to the ellipse of `p` [m].
         """
-        g, against = (respect_factor(each, *_edge(p))[0] for each in (h, h_null))
-        out = np.log(g)
-        for of_data, of_null in self.kinds:
-            out[of_data] -= np.log(against[of_null].mean())
-        return float((self.weights * out).sum())
+        g, g_null = (respect_factor(each, *_edge(p))[0] for each in (h, h_null))
+        return sum(
+            chance_level(g[of_data], g_null[of_null])[1]
+            for of_data, of_null in self.kinds
+        )
 
     def log_posterior(self, p: Array) -> float:
-        """Logarithm of the posterior density of the parameters `p`; 0 without a zone.
-
-        The likelihood has a power below 1, since the null model is random as well.
-        """
+        """Logarithm of the posterior density of the parameters `p`; 0 without a zone."""
         h, h_null = self.data.distances(p), self.null.distances(p)
-        power = 1 / (1 + self.weights.sum() / len(self.null.kind))
-        return float(power * self.log_ratio(p, h, h_null) - _minus_log_prior(p)[0])
+        return self.log_ratio(p, h, h_null) - _minus_log_prior(p)[0]
 
     def cost(self, p: Array) -> tuple[float, Array]:
-        """Minus the log likelihood of the parameters `p` with the priors, and its gradient."""
+        """Minus the logarithm of the posterior density of the parameters `p`, and its gradient."""
+        value, gradient = _minus_log_prior(p)
         h, slope = self.data.distances_and_slopes(p)
         g, by_h, by_p = _factor_and_slopes(h, p)
         h_null, slope_null = self.null.distances_and_slopes(p)
         g_null, by_h_null, by_p_null = _factor_and_slopes(h_null, p)
-        per, per_null = self.weights / g, np.zeros(len(g_null))
-        value = self.weights @ np.log(g)
+        per, per_null = 1 / g, np.zeros(len(g_null))
         for of_data, of_null in self.kinds:
-            n, total = self.weights[of_data].sum(), g_null[of_null].sum()
-            value -= n * np.log(total / of_null.sum())
-            per_null[of_null] = n / total
+            near, far = g[of_data], g_null[of_null]
+            level, log_ratio = chance_level(near, far)
+            value -= log_ratio
+            expected = len(far) / len(near) * level
+            per[of_data] -= 1 / (near + expected)
+            per_null[of_null] = 1 / (far + expected)
         by_ellipse = (per_null * by_h_null) @ slope_null - (per * by_h) @ slope
-        gradient = np.concatenate([by_ellipse, per_null @ by_p_null - per @ by_p])
-        prior, by_prior = _minus_log_prior(p)
-        return prior - float(value), gradient + by_prior
+        by_edge = per_null @ by_p_null - per @ by_p
+        return value, gradient + np.concatenate([by_ellipse, by_edge])
 
     def maximise(self, starts: Sequence[Array]) -> Array:
         """The best parameters found from several `starts`."""
@@ -300,16 +320,13 @@ class Likelihood:
             ]
         return np.asarray(min(tries, key=lambda found: found.fun).x)
 
-    def find_best(self, rng: np.random.Generator) -> Array:
-        """The maximum: the best of several starts, and of `_RESTARTS` starts around it drawn with `rng`.
+    def find_peak(self) -> Array:
+        """The maximum, or one of several that are nearly as high: the draws go on from there.
 
         The density has many small peaks, because each encounter adds an edge. Some lie far apart: a zone
         whose centre is farther back, and which is as much longer, reaches as far ahead. So these are tried.
         """
         best = self.maximise(self.starts())
-        shifts = rng.normal(size=(_RESTARTS, len(best))) * _FIRST_SPREAD
-        near = np.clip(best + shifts * (_HIGH - _LOW), _LOW, _HIGH)
-        best = self.maximise([best, *near])
         while True:
             found = self.maximise([_move_back(best, metres) for metres in _BACK])
             if self.cost(found)[0] > self.cost(best)[0] - _GAIN:

@@ -279,7 +279,7 @@ class SocialZone:
             sides = count_by_side(samples, fitted_speeds, r_max=r_max)
             if n_resamples:
                 uncertainty = estimate_uncertainty(
-                    estimator, list(ellipses), n_resamples=n_resamples, seed=seed
+                    estimator, ellipses, n_resamples=n_resamples, seed=seed
                 )
         zone = cls(
             shape,

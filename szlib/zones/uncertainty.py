@@ -26,7 +26,7 @@ to contain the *truth*, not the limit (see `szlib.zones.respect`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm, percentileofscore
 
 from ..core.checks import Array, require
-from .ellipses import DIRECTIONS, ellipse_reach, find_neighbours
+from .ellipses import DIRECTIONS, Ellipse, ellipse_reach, find_neighbours
 from .estimators import Estimator
 from .outliers import encounter_numbers, pair_numbers
 
@@ -142,14 +142,18 @@ def resampling_units(encounters: pd.DataFrame) -> tuple[str, NDArray[np.intp]]:
 
 
 def estimate_uncertainty(
-    estimator: Estimator, speeds: Sequence[float], *, n_resamples: int, seed: int
+    estimator: Estimator,
+    ellipses: Mapping[float, Ellipse],
+    *,
+    n_resamples: int,
+    seed: int,
 ) -> Uncertainty:
     """Estimate intervals and bands by resampling.
 
     Parameters
     ----------
     estimator : of the zone.
-    speeds : speeds that have a zone [m/s].
+    ellipses : of the zone, by speed [m/s].
     n_resamples : number of zones estimated again, at least 2.
     seed : of the resampling.
 
@@ -167,11 +171,13 @@ def estimate_uncertainty(
     rng = np.random.default_rng(seed)
     unit, member = resampling_units(estimator.encounters)
     n = member.max() + 1
-    estimate = _quantities(estimator.refit(np.ones((1, len(member))), speeds))
+    speeds = list(ellipses)
+    rows = [(*e.center, *e.semi_axes, e.angle) for e in ellipses.values()]
+    estimate = _quantities(np.array(rows))
     posterior = estimator.posterior(speeds)
     if posterior is not None:
         description = f"posterior: {posterior}"
-        drawn = posterior.values[rng.integers(len(posterior.values), size=n_resamples)]
+        drawn = posterior.values
         low, high = _find_percentiles(_quantities(drawn) - estimate)
         ends = np.stack([np.minimum(low, 0), np.maximum(high, 0)])
     elif estimator.is_extreme:

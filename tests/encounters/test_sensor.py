@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 from benchmarks.truth import crowds
 
-from szlib.encounters.pairs import Crowd, describe_pairs
+from szlib.encounters.pairs import Crowd
 from szlib.encounters.sensor import SensorCheck
+from szlib.workbook.cli import describe_pairs
 
 
 def crowd_of(seed: int, tracker: str = "", **sensor: float) -> pd.DataFrame:

@@ -23,7 +23,6 @@ def encounter_kinds(
         )
         for column in ("ref_id", "other_id")
     )
-    counts = np.ones(len(rows), bool)
     if area is not None:
-        counts = rows.within(as_area(area).grown(REACH))
-    return kinds_of_pairs(np.stack([ref, other]), rows, counts)
+        rows = rows.select(rows.within(as_area(area).grown(REACH)))
+    return kinds_of_pairs(np.stack([ref, other]), rows)

@@ -181,22 +181,26 @@ def test_invalid_n_resamples_is_refused(
     with pytest.raises(szlib.DataError, match="resamples must be a whole number"):
         estimate_uncertainty(
             QuantileEstimator.from_samples(samples, r_max=2.0),
-            SPEEDS,
+            known_ellipses(5.0),
             n_resamples=resamples,
             seed=0,
         )
 
 
+def known_ellipses(ahead: float, angle: float = 0.0) -> dict[float, szlib.Ellipse]:
+    """Ellipses with a centre `ahead` [m], at all `SPEEDS`."""
+    return {v: szlib.Ellipse((ahead, 0.0), (1.0, 0.7), angle) for v in SPEEDS}
+
+
 class Known(Estimator):
-    """An estimator whose ellipses are known: centres ahead at 5 m, and elsewhere in each resample."""
+    """An estimator whose ellipses are known: around 5 m ahead in the resamples."""
 
     def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
         raise NotImplementedError
 
     def refit(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
         ellipses = np.tile([5.0, 0.0, 1.0, 0.7, 0.0], (len(weights), len(speeds), 1))
-        if len(weights) > 1:
-            ellipses[..., 0] += self.parameters["differences"][:, None]
+        ellipses[..., 0] += self.parameters["differences"][:, None]
         return ellipses
 
 
@@ -214,7 +218,7 @@ def interval(
     parameters = {"differences": np.random.default_rng(0).permuted(differences)}
     found = estimate_uncertainty(
         kind(encounters=encounters, parameters=parameters, funnel=[]),
-        SPEEDS,
+        known_ellipses(5.0),
         n_resamples=len(differences),
         seed=0,
     ).intervals.set_index("quantity")
@@ -248,21 +252,20 @@ def test_an_interval_needs_a_zone_in_most_resamples() -> None:
 
 
 class Turning(Estimator):
-    """An estimator whose ellipse turns from 89 to 91 degrees in every resample."""
+    """An estimator whose ellipse is at 91 degrees in every resample."""
 
     def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
         raise NotImplementedError
 
     def refit(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
-        angle = np.radians(89 if len(weights) == 1 else -89)
-        return np.broadcast_to(
-            [0.0, 0.0, 1.0, 0.7, angle], (len(weights), len(speeds), 5)
-        )
+        ellipse = [0.0, 0.0, 1.0, 0.7, np.radians(-89)]
+        return np.broadcast_to(ellipse, (len(weights), len(speeds), 5))
 
 
 def test_an_axis_has_no_direction() -> None:
     encounters = pd.DataFrame({"encounter": range(30)})
     estimator = Turning(encounters=encounters, parameters={}, funnel=[])
-    found = estimate_uncertainty(estimator, SPEEDS, n_resamples=20, seed=0).intervals
+    ellipses = known_ellipses(0.0, np.radians(89))
+    found = estimate_uncertainty(estimator, ellipses, n_resamples=20, seed=0).intervals
     angle = found[found["quantity"] == "angle_deg"].iloc[0]
     assert (angle["low"], angle["high"]) == pytest.approx((91, 91))

@@ -2,8 +2,9 @@
 
     python tests/benchmarks/truth/calibration.py 200
 
-Parameters are drawn from the prior, and encounters from the model with these parameters: those of a null
-model, each as probable as its factor g(h). If the posterior is right, the rank of the true parameter among
+Parameters are drawn from the prior, and encounters from the model with these parameters: those of many people
+who ignore each other, each as probable as its factor g(h). The null model is another sample of these people.
+If the posterior is right, the rank of the true parameter among
 draws from it is uniform. A Kolmogorov-Smirnov test says so for each of the twelve parameters.
 """
 
@@ -30,7 +31,7 @@ NAMES = [
     *("m", "m by speed", "n", "log a", "a by speed", "log b", "b by speed", "shear"),
     *("logit f", "log w", "log A", "log c"),
 ]
-PAIRS, NULL, RANKS = 100, 2000, 100
+EVERYBODY, PAIRS, NULL, RANKS = 20_000, 100, 2000, 100
 BINS = 10
 
 
@@ -49,40 +50,42 @@ def draw_prior(rng: np.random.Generator) -> np.ndarray:
 
 
 def draw_encounters(
-    null: PairPaths, p: np.ndarray, rng: np.random.Generator
+    everybody: PairPaths, p: np.ndarray, rng: np.random.Generator
 ) -> PairPaths:
-    """Draw encounters of `null` with the frequencies of the model with parameters `p`."""
-    g = model.respect_factor(null.distances(p), *model._edge(p))[0]
+    """Draw encounters of `everybody` with the frequencies of the model with parameters `p`."""
+    g = model.respect_factor(everybody.distances(p), *model._edge(p))[0]
     share = np.zeros(len(g))
-    for kind in np.unique(null.kind):
-        of_kind = null.kind == kind
+    for kind in np.unique(everybody.kind):
+        of_kind = everybody.kind == kind
         share[of_kind] = g[of_kind] / g[of_kind].sum() * of_kind.mean()
-    drawn = rng.choice(len(g), PAIRS, p=share)
-    rows = [np.flatnonzero(null.encounter == each) for each in drawn]
-    every = np.concatenate(rows)
-    number = np.repeat(np.arange(PAIRS), list(map(len, rows)))
+    return take(everybody, rng.choice(len(g), PAIRS, p=share))
+
+
+def take(everybody: PairPaths, drawn: np.ndarray) -> PairPaths:
+    """The encounters of `everybody` with the numbers `drawn`."""
+    ends = np.append(everybody.first, len(everybody.x))
+    every = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in drawn])
     return replace(
-        null,
-        x=null.x[every],
-        y=null.y[every],
-        speed=null.speed[every],
-        encounter=number,
-        kind=null.kind[drawn],
-        encounters=null.encounters.iloc[drawn],
+        everybody,
+        x=everybody.x[every],
+        y=everybody.y[every],
+        speed=everybody.speed[every],
+        encounter=np.repeat(np.arange(len(drawn)), np.diff(ends)[drawn]),
+        kind=everybody.kind[drawn],
+        encounters=everybody.encounters.iloc[drawn],
     )
 
 
 def find_ranks(n: int) -> Iterator[dict[str, float]]:
     """The ranks of the true parameters among `RANKS` - 1 draws, of `n` posteriors."""
-    null = PairPaths.from_samples(passing_pairs(NULL, 0))
-    # The null model is known here, so that the likelihood counts in full.
-    weights = np.full(PAIRS, 1 / (1 - PAIRS / len(null.kind)))
+    everybody = PairPaths.from_samples(passing_pairs(EVERYBODY, 0))
     for seed in range(n):
         rng = np.random.default_rng([seed, 1])
         p = draw_prior(rng)
-        data = draw_encounters(null, p, rng)
-        likelihood = Likelihood(data, null, weights)
-        found = likelihood.draw(likelihood.find_best(rng), rng)
+        data = draw_encounters(everybody, p, rng)
+        null = take(everybody, rng.choice(len(everybody.kind), NULL, replace=False))
+        likelihood = Likelihood(data, null)
+        found = likelihood.draw(likelihood.find_peak(), rng)
         thinned = found.values[rng.choice(len(found.values), RANKS - 1, replace=False)]
         ranks = dict(zip(NAMES, (thinned < p).sum(axis=0).tolist(), strict=True))
         yield ranks | {"r_hat": found.r_hat, "n_effective": found.n_effective}
