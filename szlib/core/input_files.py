@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 from zipfile import BadZipFile
@@ -20,6 +21,7 @@ from .errors import DataError, SzlibError
 
 _TICK = 0.004  # two changes of a file within this time [s] can have the same time stamp (Linux)
 _JOINERS = "\u200c\u200d"  # zero-width letters of Persian, Hindi and emoji, which Python calls not printable
+_STATE = attrgetter("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
 # The files that `unchanged_files` keeps open, by path.
 _OPEN: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
 
@@ -100,9 +102,7 @@ def _states(path: Path, stream: BinaryIO) -> list[tuple[float, ...]]:
     found = [os.fstat(stream.fileno())]
     with suppress(OSError):
         found.append(path.stat())
-    return [
-        (s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in found
-    ]
+    return list(map(_STATE, found))
 
 
 def file_content(file: Path) -> tuple[int, str]:

@@ -6,9 +6,11 @@ Columns are found by the names given, by usual names, or by how people would wal
 from __future__ import annotations
 
 import re
+import tomllib
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,36 +18,11 @@ import polars as pl
 
 from ..core.errors import DataError
 from .plausibility import suggest_columns
-from .recipe import DEGREES, PIXELS, TIME_UNITS, UNITS, Recipe, advise
+from .recipe import DEGREES, PIXELS, TIME_UNITS, Recipe, advise
 from .sources import Source
 
-# Usual names of each quantity, without blanks, underscores and accents; the first one is taken before others.
-_USUAL = {
-    "t": "t time times timestamp timestamps datetime sec seconds zeit uhrzeit zeitstempel sekunden temps "
-    "horodatage secondes tiempo tempo tijd czas время 時刻 時間 时间 時間戳 시간",
-    "frame": "frame frames frameid framenumber frameno framenr frameindex bild bildnummer image trame "
-    "fotograma кадр フレーム フレーム番号 帧 프레임",
-    "id": "id pid ped pedid pedestrian pedestrianid person personid personnr agent agentid track trackid "
-    "traj trajid trajectory trajectoryid object objectid objid participant subject fußgänger fußgängerid "
-    "personne piéton identifiant persona peatón pessoa pedone человек 人 人物 人物id 歩行者 歩行者id "
-    "行人 行人id 보행자",
-    "x": "x posx xpos positionx xposition xcoord coordx xcoordinate centerx x座標 x坐标 lon longitude lng",
-    "y": "y posy ypos positiony yposition ycoord coordy ycoordinate centery y座標 y坐标 lat latitude",
-    "day": "day",
-}
-_GEOGRAPHIC = ["lon", "longitude", "lng", "lat", "latitude"]
-_TIME_NAMES = {name: name for name in TIME_UNITS} | {"sec": "s", "seconds": "s"}
-_POSITION_NAMES = {
-    **{name: name for name in UNITS},
-    **dict.fromkeys(("px", "pixel", "pixels"), PIXELS),
-    **dict.fromkeys(("deg", "degrees"), DEGREES),
-    "feet": "ft",
-    "yards": "yd",
-}
-_RECORDINGS = (
-    "recording recordingid scene sceneid camera cameraid cam session sessionid sequence sequenceid video "
-    "videoid date run runid trial trialid experiment clip place location locationid site dataset"
-)
+# Usual names of columns and units.
+_NAMES = tomllib.loads(Path(__file__).with_name("names.toml").read_text("utf-8"))
 _CLOCK = re.compile(r"(time|sec|stamp|frame|zeit|hour|minute)")  # in names of times
 _LONGEST_SHARE = (
     5  # people have so many rows under each value that tells recordings apart
@@ -81,7 +58,9 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
             raise DataError(
                 f"{where} has no field {k}; it has {len(names)}, the first is 0"
             )
-    at = {quantity: _candidates(quantity, given, names) for quantity in _USUAL}
+    at = {
+        quantity: _candidates(quantity, given, names) for quantity in _NAMES["columns"]
+    }
     is_free = "t" not in given and bool(at["frame"])
     is_frame = is_free and (not at["t"] or recipe.frame_rate is not None)
     time = "frame" if "frame" in given or is_frame else "t"
@@ -97,16 +76,19 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
             raise DataError(f"{where} names {same[0]} twice; rename one of them")
     found = given | {quantity: at[quantity][0] for quantity in needed if at[quantity]}
     if missing := [quantity for quantity in needed if quantity not in found]:
-        lacking = ", ".join(str(given.get(quantity, quantity)) for quantity in missing)
-        raise DataError(
-            f"{where} has no column {lacking}; {_suggest(source, recipe, found, missing)}"
-        )
+        known = ", ".join(map(repr, [n or k for k, n in enumerate(names)][:12]))
+        advice = suggest_reading(source, replace(recipe, columns=found or None))
+        columns = given | dict.fromkeys(missing, "...")
+        advice = advice or f"it has {known}; {advise(columns=columns)}"
+        raise DataError(f"{where} has no column {', '.join(missing)}; {advice}")
     keys = {q: _split_unit(at) for q, at in found.items() if at in names}
-    units = {_POSITION_NAMES.get(keys[c][1]) if c in keys else None for c in "xy"}
-    if all(c in keys and keys[c][0] in _GEOGRAPHIC for c in "xy"):
+    units = {_NAMES["units"].get(keys[c][1]) if c in keys else None for c in "xy"}
+    if all(
+        c in keys and keys[c][0] in _NAMES["kinds"]["degrees"].split() for c in "xy"
+    ):
         units = {DEGREES}
     recipe = Recipe(columns=found).over(recipe)
-    clock = _TIME_NAMES.get(keys.get("t", ("", ""))[1])
+    clock = _NAMES["time_units"].get(keys.get("t", ("", ""))[1])
     if clock and not recipe.time_unit and recipe.frame_rate is None:
         recipe = replace(recipe, time_unit=clock)
     if not (recipe.unit or recipe.has_places) and len(units) == 1:
@@ -181,7 +163,7 @@ def ask_about_recordings(
     used = " ".join(map(str, columns.values()))
     for k, name in enumerate(source.names):
         key = _split_unit(name)[0]
-        is_usual = by_name and key in _RECORDINGS.split()
+        is_usual = by_name and key in _NAMES["kinds"]["recordings"].split()
         if (name or f"f{k}") in used or k in columns.values() or _CLOCK.search(key):
             continue
         if not (is_mixed or is_usual):
@@ -203,7 +185,8 @@ def _split_unit(name: object) -> tuple[str, str]:
     """A name without blanks, accents and capitals, and its unit: ("posx", "mm") of "Pos X [mm]"."""
     letters = unicodedata.normalize("NFKD", str(name).casefold())
     words = re.findall(r"[^\W_]+", letters)
-    has_unit = len(words) > 1 and words[-1] in (*_POSITION_NAMES, *_TIME_NAMES)
+    units = _NAMES["units"] | _NAMES["time_units"]
+    has_unit = len(words) > 1 and words[-1] in units
     unit = words.pop() if has_unit else ""
     return "".join(words), unit
 
@@ -218,43 +201,39 @@ def _candidates(
     if quantity in given:
         is_sum = isinstance(at, int) or re.search(r"[-+*/|(]", at)
         return [at] if is_sum else []
-    usual = {_split_unit(each)[0] for each in _USUAL[quantity].split()}
+    usual = {_split_unit(each)[0] for each in _NAMES["columns"][quantity].split()}
     return [name for name in names if _split_unit(name)[0] in usual]
 
 
-def _suggest(
-    source: Source,
-    recipe: Recipe,
-    found: Mapping[str, str | int],
-    missing: Sequence[str],
-) -> str:
-    """As which columns people would walk, and how to read them.  A constant column is none of them."""
-    names = [name or k for k, name in enumerate(source.names)]
+def suggest_reading(source: Source, recipe: Recipe) -> str:
+    """As which columns of a `source` people would walk, and how to read them; empty where there are none.
+
+    The columns in the `recipe` are taken as they are.  A constant column is none of the others.
+    """
+    found = recipe.columns or {}
+    quantities = ("frame" if "frame" in found else "t", "id", "x", "y")
+    given = [found[quantity] for quantity in quantities if quantity in found]
+    others = (
+        [name or k for k, name in enumerate(source.names)] if len(given) < 4 else []
+    )
     columns = dict[str | int, np.ndarray]()
-    for at in dict.fromkeys([*found.values(), *names[:_LISTED]]):
-        numbers = _as_floats(column_of(source, at).head(_SAMPLE))
+    for at in dict.fromkeys([*given, *others[:_LISTED]]):
+        unit = recipe.time_unit if at == found.get("t") else None
+        numbers = _as_floats(column_of(source, at).head(_SAMPLE), unit)
         usable = numbers[np.isfinite(numbers)]
         is_varied = 2 * len(usable) > len(numbers) and np.ptp(usable) > 0
-        if at in found.values() or (is_varied and len(columns) < _TRIED):
+        if at in given or (is_varied and len(columns) < _TRIED):
             columns[at] = numbers
-    time = "frame" if "frame" in (*found, *missing) else "t"
     shown = list(columns)
-    known = [
-        shown.index(found[name]) if name in found else None
-        for name in (time, "id", "x", "y")
-    ]
-    reading = replace(recipe, columns=dict(found) or None)
+    known = [shown.index(found[q]) if q in found else None for q in quantities]
     values = np.array(list(columns.values()))
-    if columns and (advice := suggest_columns(values, shown, known, reading)):
-        return advice
-    given = dict(recipe.columns or {}) | dict.fromkeys(missing, "...")
-    return f"it has {', '.join(map(repr, names[:12]))}; {advise(columns=given)}"
+    return suggest_columns(values, shown, known, recipe) if shown else ""
 
 
-def _as_floats(values: pl.Series) -> np.ndarray:
+def _as_floats(values: pl.Series, unit: str | None) -> np.ndarray:
     """A column as floats, whatever it holds: numbers, times, or texts of which each gets a number."""
     for decimal in ".,":
-        times = to_times(values, "UTC", decimal=decimal)[0]
+        times = to_times(values, "UTC", unit, decimal)[0]
         if 2 * times.null_count() <= len(values):
             return times.fill_null(np.nan).to_numpy()
     return to_ids(values, "").cast(pl.Float64).fill_null(np.nan).to_numpy()
@@ -322,6 +301,8 @@ def to_ids(values: pl.Series, where: str) -> pl.Series:
     of 100,000 people share one with a probability below 1e-6.  Raises DataError, beginning with `where`, if
     two texts are one number.
     """
+    if values.dtype.is_nested():
+        return pl.repeat(None, len(values), dtype=pl.Int64, eager=True)
     if not values.dtype.is_numeric():
         values = values.cast(pl.String).str.strip_chars(" \"'")
         values = values.set(values == "", None)

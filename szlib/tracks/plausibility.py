@@ -7,7 +7,7 @@ The error message suggests the first of them with which people walk.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import permutations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -111,7 +111,13 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
     )
 
 
-def check_people(rows: pl.DataFrame, recipe: Recipe, given: Recipe, path: Path) -> None:
+def check_people(
+    rows: pl.DataFrame,
+    recipe: Recipe,
+    given: Recipe,
+    path: Path,
+    suggest: Callable[[], str],
+) -> None:
     """Raise DataError where people cannot move as in a table, or on such a site; suggest another reading.
 
     Where the user has given the unit, a DataWarning is enough, as where people may just all be standing.
@@ -121,6 +127,7 @@ def check_people(rows: pl.DataFrame, recipe: Recipe, given: Recipe, path: Path) 
     rows : t [s], id, x, y [m].
     recipe, path : how the file was read, and the file.
     given : the recipe that the user gave.
+    suggest : gives advice how to read the file.
     """
     seen, is_given = first_rows(rows), given.has_places
     if not is_table_known(recipe):
@@ -128,7 +135,7 @@ def check_people(rows: pl.DataFrame, recipe: Recipe, given: Recipe, path: Path) 
         fault = found.fault if found else "people are seen too briefly"
         is_fast = found is not None and found.high_speed > _FASTEST[1]
         is_odd = fault or (found and found.irregularity > _REGULAR)
-        advice = suggest_reading(seen, recipe) if is_odd else ""
+        advice = suggest() if is_odd else ""
         message = f"{path}: {fault or 'people are seen at irregular times'}"
         message += f"; {advice}" if advice else ""
         if is_given and advice:
@@ -194,16 +201,6 @@ def first_rows(rows: pl.DataFrame) -> np.ndarray:
 # --- other recipes ------------------------------------------------------------------------------------
 
 
-def suggest_reading(seen: np.ndarray, recipe: Recipe) -> str:
-    """Advice for the first change of a `recipe` with which people walk; empty if there is none.
-
-    The rows t [s], id, x, y [m] were `seen` with the recipe, shape (4, n).
-    """
-    names = [(recipe.columns or {}).get(name, name) for name in ("t", "id", "x", "y")]
-    seen = seen[:, np.isfinite(seen).all(axis=0)]
-    return suggest_columns(seen, names, range(4), recipe) if seen.size else ""
-
-
 def suggest_columns(
     values: np.ndarray,
     names: Sequence[str | int],
@@ -214,7 +211,7 @@ def suggest_columns(
 
     Parameters
     ----------
-    values : numbers of some columns, shape (m, n).
+    values : numbers of some columns, shape (m, n); those of t in seconds.
     names : of the columns.
     known : number of the column of t, id, x and y, None where it is unknown.
     recipe : with the columns that are known.
@@ -244,27 +241,27 @@ def _changes(
     """Changes of a `recipe`, the likeliest first, where the columns of t, id, x, y are `known`, or some.
 
     Each with the factors of t, id, x and y, whether t is counted in frames, and the columns that it keeps.
-    Where all are known, the rows of `values` are t [s], id, x, y [m].
     """
-    is_frame, is_read = "frame" in (recipe.columns or {}), None not in known
-    for is_counted in (not is_read,) if is_frame else (False, True):
+    is_frame, metres = "frame" in (recipe.columns or {}), recipe.metres or 1.0
+    for is_counted in (True,) if is_frame else (False, True):
         more = {"frame_rate": _FRAMES} if is_counted and not recipe.frame_rate else {}
-        rate = (recipe.frame_rate or _FRAMES) if is_counted else 1.0
+        t = 1 / (recipe.frame_rate or _FRAMES) if is_counted else 1.0
+        yield more, [t, 1, metres, metres], is_counted, known
         for unit in ("m", "mm", "cm", "ft"):
-            factor = UNITS[unit] / (recipe.metres or 1.0)
-            change = more if factor == 1 else {"unit": unit, **more}
-            yield change, [1 / rate, 1, factor, factor], is_counted, known
-    if not is_read or is_frame:
+            change, factor = {"unit": unit, **more}, UNITS[unit]
+            yield change, [t, 1, factor, factor], is_counted, known
+    if is_frame or None in known:
         return
     if recipe.time_unit is None:
         for unit in ("ms", "days"):
-            yield {"time_unit": unit}, [TIME_UNITS[unit], 1, 1, 1], False, known
+            factors = [TIME_UNITS[unit], 1, metres, metres]
+            yield {"time_unit": unit}, factors, False, known
     if (np.abs(values[2]) <= 180).all() and (np.abs(values[3]) <= 90).all():
         lon, lat = (round(float(np.median(each)), 2) for each in values[2:4])
         east = _DEGREE * np.cos(np.radians(lat))
         degrees = {"unit": DEGREES, "origin": [lon, lat]}
         yield degrees, [1, 1, east, _DEGREE], False, known
-    yield {}, [1, 1, 1, 1], False, [None] * 4  # in another order
+    yield {}, [1, 1, metres, metres], False, [None] * 4  # in another order
 
 
 def _find_walking(

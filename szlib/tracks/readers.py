@@ -25,27 +25,29 @@ from .plausibility import (
     check_people,
     describe_rows,
     find_implausible,
-    first_rows,
     is_table_known,
-    suggest_reading,
 )
 from .recipe import Recipe, advise, find_recipe
-from .rows import EXPECTED, Rows, load_rows, open_rows, open_source
+from .rows import (
+    EXPECTED,
+    MISSING,
+    NO_ID,
+    Rows,
+    load_rows,
+    open_rows,
+    open_source,
+    rejection_reason,
+    select_usable,
+)
 from .shapes import SHAPES, require_format
 from .sources import is_table, open_table, require_memory, unpacked
 
-# why a row is rejected
-MISSING, NO_ID = "missing or not a number", "id not a whole number"
 MAX_REJECTED = 0.05
 """Share of the rows of a file that may be unusable, unless a `Recipe` gives another (assumed)."""
 MOST_DOUBLED = 0.2
 """Share of rows up to which a person may have a second place at one time (assumed)."""
 # A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
 CALENDAR_BEGINS = 1e8
-LAST_SECOND = (
-    4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
-)
-FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 _HEAD = 1 << 16  # bytes of a text by which its day is found
 # bytes of memory for each of a text that is scanned (measured: 1.3 to 1.9)
 _SCANNED = 2
@@ -233,7 +235,7 @@ def _accept(rows: Rows, path: Path, given: Recipe) -> LoadedFile:
     rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
     name = f"read {path.name}{rate}"
     stage = funnels.stage(name, table.height, good.height, reasons)
-    check_people(good, recipe, given, path)
+    check_people(good, recipe, given, path, rows.suggest_reading)
     return LoadedFile(path, with_days(good, path, recipe), stage, recipe)
 
 
@@ -260,7 +262,7 @@ def _report_rejected(
         share = ceil(100 * n_bad / n) / 100
         advice = f"if the others are right: {advise(max_rejected=share)}"
     if 2 * n_bad > n and not is_table_known(recipe):
-        advice = suggest_reading(first_rows(table), recipe) or advice
+        advice = rows.suggest_reading() or advice
     raise DataError(
         f"{path}, line {line}: {reason}{held}; {n_bad} of {n} rows cannot be used as {recipe.file_format}; "
         f"{advice}"
@@ -271,23 +273,6 @@ def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
     counts = [f"{count} x {reason}" for reason, count in reasons.items() if count]
     if counts:
         warn(f"{where}: rejected rows: {', '.join(counts)}")
-
-
-def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
-    """Why a row of a `table` as from `open_file` is rejected; null where it is usable."""
-    numbers, places = pl.col("t", "x", "y"), pl.col("x", "y")
-    reasons = {
-        "missing or extra fields": pl.col("ragged"),
-        MISSING: pl.any_horizontal(numbers.is_null()),
-        NO_ID: pl.col("id").is_null(),
-        "not finite": ~pl.all_horizontal(numbers.is_finite()),
-        "time not in seconds since 1970": pl.col("t").abs() > LAST_SECOND,
-        "position not on Earth": pl.any_horizontal(places.abs() > FARTHEST),
-    }
-    if "day" in table.collect_schema():
-        reasons["no day"] = pl.col("day").is_null()
-    whens = [pl.when(holds).then(pl.lit(name)) for name, holds in reasons.items()]
-    return pl.coalesce(whens)
 
 
 @contextmanager
@@ -305,8 +290,9 @@ def open_file(path: Path, recipe: Recipe) -> Iterator[tuple[Recipe, pl.LazyFrame
 def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:
     """A description of file `path`, read with a `recipe`, by its first rows; and this recipe, completed."""
     with open_file(path, recipe) as (found, scan):
-        usable = scan.filter(rejection_reason(scan).is_null())
-        rows = usable.head(MOST_SHOWN).select("t", "id", "x", "y").collect()
+        rows = (
+            select_usable(scan).head(MOST_SHOWN).select("t", "id", "x", "y").collect()
+        )
     return describe_rows(rows, found, path.name), found
 
 
@@ -324,11 +310,10 @@ def find_day(path: Path, recipe: Recipe) -> str | None:
     with suppress(DataError, OSError), unpacked(path) as plain:
         source, found = open_source(plain, path, recipe, size=_HEAD)
         rows = load_rows(source, found, path, is_head=True)
-        usable = rows.table.filter(rejection_reason(rows.table).is_null())
-        first = with_days(usable.head(1).collect(), path, rows.recipe)
-        has_own = "day" in (rows.recipe.columns or {})
-        if first.height and not has_own and first["day"][0] != file_stem(path):
-            return str(first["day"][0])
+        first = select_usable(rows.table).head(1).collect()
+        if first.height and "day" not in (rows.recipe.columns or {}):
+            day = str(with_days(first, path, rows.recipe)["day"][0])
+            return None if day == file_stem(path) else day
     return None
 
 

@@ -17,6 +17,7 @@ from .columns import (
     ask_about_recordings,
     column_of,
     find_columns,
+    suggest_reading,
     to_ids,
     to_numbers,
     to_times,
@@ -39,6 +40,12 @@ EXPECTED = (
 )
 """What can be read, for error messages."""
 _DAY = 86_400  # [s]
+# why a row is rejected
+MISSING, NO_ID = "missing or not a number", "id not a whole number"
+LAST_SECOND = (
+    4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
+)
+FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,10 @@ class Rows:
     table: pl.LazyFrame
     recipe: Recipe
     source: Source | None = None
+
+    def suggest_reading(self) -> str:
+        """Advice how to read the file, if people walk then; empty if there is none."""
+        return suggest_reading(self.source, self.recipe) if self.source else ""
 
     def show_field(self, line: int, name: str) -> str:
         """The column that holds `name`, and what is in it at a `line`, for people."""
@@ -245,3 +256,25 @@ def scan_streamed(plain: Path, path: Path, recipe: Recipe) -> Rows | None:
     named = {name: pl.col(f"f{at}") for name, at in columns.items()}
     table = scan.select("line", ragged=ragged, **named)
     return Rows(table.with_columns(pl.col("^(x|y|speed)$") * metres), recipe)
+
+
+def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
+    """Why a row of a `table` as in `Rows` is rejected; null where it is usable."""
+    numbers, places = pl.col("t", "x", "y"), pl.col("x", "y")
+    reasons = {
+        "missing or extra fields": pl.col("ragged"),
+        MISSING: pl.any_horizontal(numbers.is_null()),
+        NO_ID: pl.col("id").is_null(),
+        "not finite": ~pl.all_horizontal(numbers.is_finite()),
+        "time not in seconds since 1970": pl.col("t").abs() > LAST_SECOND,
+        "position not on Earth": pl.any_horizontal(places.abs() > FARTHEST),
+    }
+    if "day" in table.collect_schema():
+        reasons["no day"] = pl.col("day").is_null()
+    whens = [pl.when(holds).then(pl.lit(name)) for name, holds in reasons.items()]
+    return pl.coalesce(whens)
+
+
+def select_usable(scan: pl.LazyFrame) -> pl.LazyFrame:
+    """The usable rows of a `scan` as in `Rows`."""
+    return scan.filter(rejection_reason(scan).is_null())

@@ -47,8 +47,8 @@ _VADERE_RATE = (
     10.0  # frames a second to which PedPy brings footsteps: those of the clock
 )
 
-# The table of a file, and the recipe that reads it, completed by the file.
-Parsed = tuple[pl.DataFrame | pd.DataFrame | Source, Recipe]
+# The table of a file, and the values of a recipe that the file states.
+Parsed = tuple[pl.DataFrame | pd.DataFrame | Source, dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,12 @@ class Shape:
         reader, advice = "szlib", "fetch it again"
         try:
             if self.parse in PARSERS:
-                table, recipe = PARSERS[self.parse](plain, path, recipe)
+                table, stated = PARSERS[self.parse](plain, path, recipe)
+                recipe = recipe.over(Recipe(**stated))
             else:
                 reader, advice = "PedPy", _PEDPY_ADVICE
-                table, recipe = _load_by_pedpy(self.parse, plain, path, recipe)
+                table, stated = _load_by_pedpy(self.parse, plain, path, recipe)
+                recipe = Recipe(**stated).over(recipe)
             if isinstance(table, Source):
                 return table, recipe
             return open_table(table, where), recipe
@@ -171,7 +173,7 @@ def _parse_splines(plain: Path, path: Path, recipe: Recipe) -> Parsed:
     for person in range(1, int(next(lines).split()[0]) + 1):
         for _point in range(int(next(lines).split()[0])):
             rows.append([person, *next(lines).split()[:3]])
-    return pl.DataFrame(rows, schema=["id", "x", "y", "frame"], orient="row"), recipe
+    return pl.DataFrame(rows, schema=["id", "x", "y", "frame"], orient="row"), {}
 
 
 def _parse_ewap(plain: Path, path: Path, recipe: Recipe) -> Parsed:
@@ -203,7 +205,7 @@ def _parse_ewap(plain: Path, path: Path, recipe: Recipe) -> Parsed:
         )
     interval = steps["frame"].median()
     gap = _EWAP_GAP * interval / rate if isinstance(interval, float) else None
-    return source, recipe.over(Recipe(frame_rate=rate, max_gap=gap))
+    return source, {"frame_rate": rate, "max_gap": gap}
 
 
 def _parse_trajnet(plain: Path, path: Path, recipe: Recipe) -> Parsed:
@@ -216,7 +218,7 @@ def _parse_trajnet(plain: Path, path: Path, recipe: Recipe) -> Parsed:
     table = pd.DataFrame(rows)[["f", "p", "x", "y"]].drop_duplicates(["f", "p"])
     frames = np.unique(table["f"])
     step = np.diff(frames).min() if len(frames) > 1 else 1.0
-    return table, recipe.over(Recipe(frame_rate=float(step * min(rates, default=2.5))))
+    return table, {"frame_rate": float(step * min(rates, default=2.5))}
 
 
 def _parse_pathfinder(plain: Path, path: Path, recipe: Recipe) -> Parsed:
@@ -229,12 +231,12 @@ def _parse_pathfinder(plain: Path, path: Path, recipe: Recipe) -> Parsed:
         for person, times in json.loads(read_text(plain, f"{path}")).items()
         for t, at in times.items()
     ]
-    return pl.DataFrame(rows, schema=["t", "id", "x", "y"], orient="row"), recipe
+    return pl.DataFrame(rows, schema=["t", "id", "x", "y"], orient="row"), {}
 
 
 def _parse_magni(plain: Path, path: Path, recipe: Recipe) -> Parsed:
     """THOR-MAGNI: a helmet is worn by different people one after the other."""
-    return read_magni_rows(plain, path)[["t", "id", "x", "y"]], recipe
+    return read_magni_rows(plain, path), {}
 
 
 def read_magni_rows(plain: Path, path: Path) -> pd.DataFrame:
@@ -272,14 +274,14 @@ def _parse_wide(plain: Path, path: Path, recipe: Recipe) -> Parsed:
         id=name.str.extract(r"(\d+)$"), variable=name.str.head(1).str.to_lowercase()
     )
     rows = long.pivot("variable", index=selectors.exclude("variable", "value"))
-    return replace(open_frame(rows, f"{path}"), decimal=source.decimal), recipe
+    return replace(open_frame(rows, f"{path}"), decimal=source.decimal), {}
 
 
 def _parse_level_x(plain: Path, path: Path, recipe: Recipe) -> Parsed:
     """The inD family: whom a track belongs to, and the frame rate, are in files beside it."""
     table, stated = pl.read_csv(plain, infer_schema=False), dict[str, Any]()
     if "_tracks." not in path.name:
-        return table, recipe
+        return table, {}
     beside = (
         path.with_name(path.name.replace("_tracks.", f"_{name}."))
         for name in ("tracksMeta", "recordingMeta")
@@ -292,7 +294,7 @@ def _parse_level_x(plain: Path, path: Path, recipe: Recipe) -> Parsed:
         people = pl.read_csv(kinds, infer_schema=False).select("trackId", "class")
         table = table.join(people, "trackId", "left", maintain_order="left")
         stated["where"] = "class = 'pedestrian'"
-    return table, recipe.over(Recipe(**stated))
+    return table, stated
 
 
 def _parse_nuscenes(plain: Path, path: Path, recipe: Recipe) -> Parsed:
@@ -315,7 +317,7 @@ def _parse_nuscenes(plain: Path, path: Path, recipe: Recipe) -> Parsed:
         if kind.startswith("human"):
             t, scene = 1e-6 * sample["timestamp"], sample["scene_token"]
             rows.append((t, person, *each["translation"][:2], scene))
-    return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), recipe
+    return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), {}
 
 
 PARSERS: dict[str, Callable[[Path, Path, Recipe], Parsed]] = {
@@ -357,4 +359,4 @@ def _load_by_pedpy(loader: str, plain: Path, path: Path, recipe: Recipe) -> Pars
     if not (rate := float(loaded.frame_rate)) > 0:
         raise ValueError(f"it states {rate:g} frames/s; expected a positive number")
     rows = pd.DataFrame(loaded.data)[["frame", "id", "x", "y"]]
-    return rows, Recipe(frame_rate=rate, unit="m").over(recipe)
+    return rows, {"frame_rate": rate, "unit": "m"}
