@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from studies.respect import data_and_null
+from studies.respect import data_and_null, load
 
 import szlib
 from szlib.core.files import write_file
@@ -43,7 +43,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--cache", type=Path, default=Path("../results/null"))
     asked = parser.parse_args()
-    zones = {name: fit(asked, site) for name, (site, _, _) in SOURCES.items()}
+    zones = {name: fit(site) for name, (site, _, _) in SOURCES.items()}
     entries = {name: describe(name, zone) for name, zone in zones.items()}
     entries["atc-paper"] = describe_paper(asked, None)
     entries["atc-paper-strangers"] = describe_paper(asked, "strangers")
@@ -61,12 +61,11 @@ def main() -> None:
     print(FILE.read_text(encoding="utf-8"))
 
 
-def fit(asked: argparse.Namespace, site: str) -> szlib.SocialZone:
-    """The zone of the strangers of a site."""
-    samples, null = data_and_null(site, asked)
-    strangers, model = szlib.of_kind(samples, "strangers"), null.of_kind("strangers")
+def fit(site: str) -> szlib.SocialZone:
+    """The zone of every pair of people of a site who come towards each other or cross."""
+    tracks, area, _ = load(site)
     with warnings.catch_warnings(action="ignore", category=szlib.DataWarning):  # the verdict says it
-        return szlib.SocialZone.fit(strangers, null=model, speeds=(0.9, SPEED, 1.3))
+        return szlib.SocialZone.from_tracks(tracks, area=area, speeds=(0.9, SPEED, 1.3), progress=False)
 
 
 def describe(name: str, zone: szlib.SocialZone) -> dict[str, Any]:

@@ -30,8 +30,8 @@ person behind me has me ahead. The prior decides between zones that are alike ah
 The zone has the median of each parameter in the posterior. Its maximum is not stable: each encounter adds an
 edge, so the density has many small peaks. The intervals are meant to contain the true zone. People differ
 from the model: around circles of 0.8 m that people keep by ORCA the zone is 1 to 3 cm too small, in every
-crowd. So centre ahead and semi-axis along the motion have a standard deviation of at least 3 cm, the semi-axis
-across of at least 1.2 cm.
+crowd. So the posterior has a standard deviation of at least 3 cm of the centre ahead and of the semi-axis
+along the motion, and of at least 1.2 cm of the semi-axis across.
 
 Measured on zones imposed on real paths: notebook 25.
 """
@@ -58,13 +58,11 @@ from .sampling import Draws
 # Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
 # a row, for other reasons than respect, which a shift in time removes as well. Who stands has no heading.
 _KINDS = ("opposite", "crossing")
-# Twice the logarithm of the posterior density of a zone over that of none. Without respect: up to 32 in 23
-# crowds of 400 pairs with a null model of 1,000; up to 9 in 9 kinds of crowds with one of 4,000. With a
+# Twice the logarithm of the posterior density of a zone over that of none. Without respect: up to 19 in 45
+# crowds of 9 kinds with 500 to 1,700 pairs (singles, groups, trains, turnstiles, signals and others). With a
 # circle of 0.5 m that people keep: at least 110 from 150 pairs on.
 _MIN_EVIDENCE = 35.0
-_NULL_DRAWN = 12_000  # encounters of the null model that are used
-_NULL_PER_ENCOUNTER = 2  # fewest, for each of the data
-_DATA_DRAWN = 4000  # encounters of the data that are used: with more, people differ from the model by more
+_DRAWN = 12_000  # encounters of each sample that are used
 # Encounters of the data within r_max: with fewer the zone reaches as far as nobody was seen.
 MIN_COMPARED = 150
 # What the edge of people differs from that of the model: least standard deviation of the posterior of centre
@@ -125,12 +123,12 @@ class RespectEstimator(Estimator):
             )
             against = against[against["kind"].isin(kinds)]
         rng = np.random.default_rng(0)
-        is_drawn = _draw(close["encounter"], _DATA_DRAWN, rng)
+        is_drawn = _draw(close["encounter"], _DRAWN, rng)
         if not is_drawn.all():
-            reason = f"of more than {_DATA_DRAWN:,} encounters, some at random"
+            reason = f"of more than {_DRAWN:,} encounters, some at random"
             close = funnels.select(close, is_drawn, "samples: drawn", reason)
         n, n_null = (each["encounter"].nunique() for each in (close, against))
-        against = against[_draw(against["encounter"], _NULL_DRAWN, rng)]
+        against = against[_draw(against["encounter"], _DRAWN, rng)]
         if not (n and n_null):
             raise ZoneError(
                 f"{n} encounters of the data and {n_null} of the null model, of the kinds "
@@ -147,10 +145,9 @@ class RespectEstimator(Estimator):
 
     @property
     def is_large(self) -> bool:
-        """Whether the data holds `MIN_COMPARED` encounters, and the null model twice as many as the data."""
+        """Whether the data holds `MIN_COMPARED` encounters, and the null model as many as the data."""
         n = len(self.encounters)
-        n_null = self.parameters["null_encounters"]
-        return bool(n >= MIN_COMPARED and n_null >= _NULL_PER_ENCOUNTER * n)
+        return bool(MIN_COMPARED <= n <= self.parameters["null_encounters"])
 
     @cached_property
     def likelihood(self) -> Likelihood:
