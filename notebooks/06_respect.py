@@ -353,7 +353,7 @@ if is_plaza:
 Markdown(
     "<details><summary>Answer</summary>\n\nThe hull: one person inside is enough. The quantile ignores up to 5 % of the "
     "people, whoever they are. The respect zone knows how many would come near by chance, and so which share is careless. "
-    "It needs many encounters, and a null model with at least twice as many. The library takes it where the data shows "
+    "It needs many encounters, and a null model with at least as many. The library takes it where the data shows "
     "respect: `szlib.SocialZone.fit(samples, null=null)`, without a method.\n\n</details>"
 )
 

@@ -240,7 +240,7 @@ record.check(
 # | `"hull"` | nobody ever was | shrinks: one careless person is enough |
 # | `"respect"` | careful people keep out, compared with people who ignore each other | stable; needs a null model |
 #
-# Without `method`, szlib takes the respect zone if the data has 150 encounters, if the null model has twice as many, and if
+# Without `method`, szlib takes the respect zone if the data has 150 encounters, if the null model has as many, and if
 # they show respect. Else it takes the paper's, as a description. The quantile is beside the notebooks, in
 # `studies/quantile_zone.py`: importing this file adds it to `szlib.SocialZone.fit`.
 # `"paper"` is the hull after LOF with 20 neighbours removed 0.2 % of the samples (chapter 03).

@@ -225,7 +225,7 @@ class SocialZone:
         method : "respect", "paper" or "hull". "paper" is the paper's method to the letter: LOF over samples
             with 20 neighbours removes 0.2 %, then hull, slices, ellipses. "hull" differs in one step: it
             judges whole encounters and removes as many as are outliers. Both zones shrink as the data grows.
-            None: "respect" if, within r_max, the data holds 150 encounters and the null model twice as many,
+            None: "respect" if, within r_max, the data holds 150 encounters and the null model as many,
             and they show respect, else "paper", which describes where hardly anybody was.
         r_max : distance within which people count [m].
         speeds : speeds of the zones [m/s].

@@ -356,7 +356,7 @@ def test_the_default_is_the_paper_s_where_the_null_model_is_small_or_shows_no_re
 
     assert method(data, None) == "paper"
     assert (
-        method(data, null_of(null.samples[null.samples["encounter"] < 1500])) == "paper"
+        method(data, null_of(null.samples[null.samples["encounter"] < 400])) == "paper"
     )
     assert method(passing_pairs(300, 60), null) == "paper"
     assert method(data.drop(columns="other_speed"), null) == "paper"
