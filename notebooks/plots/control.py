@@ -277,7 +277,7 @@ def draw_plans(run: Run, rows: Sequence[int]) -> Figure:
 
 
 def draw_moment(ax: Axes, run: Run, row: int, state: Array, plan: Array) -> None:
-    """Draw a robot in a `state` with its `plan`, among the walls and the person of a `row` of a `run`."""
+    """Draw a robot in a `state` with its `plan` into `ax`, among walls and person of a `row` of a `run`."""
     scene, time = run.scenario, row * run.settings.dt
     person = scene.people[0].after(time)
     (x, y), heading = person.position, person.heading or 0.0

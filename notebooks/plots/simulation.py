@@ -108,7 +108,7 @@ def plot_crowd(run: Run, *, walked: Array | None = None, ax: Axes | None = None)
 
 
 def draw_crowds(runs: Mapping[str, Run]) -> Figure:
-    """Draw several runs along x through one crowd side by side, with the time to the goal and that with h < 0.
+    """Draw `runs` along x through one crowd side by side, with the time to the goal and that with h < 0.
 
     Examples
     --------

@@ -164,6 +164,9 @@ class DriveStep(Step):
     control : (v, omega) to hold for the next dt, within their limits, shape (2,) [m/s, rad/s].
     own : state of the robot now, (x, y, theta, v, omega).
     wheels : how they follow the point.
+
+    As of a `Step` are `status`, `walls_safe`, `passively_safe`, `target`, `solve_time`, `timed_out`, `scene`,
+    `of_point`, `way_length`, `ways`, `stuck` and `clock`.
     """
 
     own: Array

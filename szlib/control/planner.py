@@ -127,7 +127,11 @@ class TimeBudget:
 
 
 class Program(LinearProblem):
-    """A linear problem that is solved by priorities; for parameters see there.
+    """A linear problem that is solved by priorities.
+
+    Parameters
+    ----------
+    settings, shapes, has_floors : as of `LinearProblem`.
 
     Attributes
     ----------
@@ -274,7 +278,7 @@ class Planner:
         return plan
 
     def prepare(self, question: Question, has_floors: bool) -> Program:
-        """The program of a `question`."""
+        """The program of a `question`; `has_floors` as of `LinearProblem`."""
         obstacles = question.barriers
         if has_floors:
             bodies = find_bodies(question.zones, self.settings, as_predicted=True)

@@ -97,6 +97,7 @@ class Scene(NamedTuple):
     def find_danger(self, path: Path, is_feasible: bool) -> str:
         """Why a robot is not safe that goes along a `path` for a step; "" if it is.
 
+        `is_feasible` says whether its plan violates no row without a price.
         h has the allowance eps on the way: it is for what a way cuts off a round zone.
         """
         if self.tracked.unknown:

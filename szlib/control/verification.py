@@ -73,7 +73,7 @@ class Report:
 
 
 class Sampled(NamedTuple):
-    """Points of a way and their times, `PIECES` for each input, and the states between two inputs."""
+    """A way: `points` and their `times`, `PIECES` for each input, and the `states` between two inputs."""
 
     points: Array
     times: Array
