@@ -377,7 +377,9 @@ first, on the whole common track of the two, and left out: {with_companions} her
 #
 # - it takes **every pair** of people who come towards each other or cross, each pair once, whoever else is near;
 # - its null model moves whole **streams**: all people who walk in about the same direction are moved together in time, and
-#   so is everybody who walks with one of them. Groups, queues and trains stay as they are.
+#   so is everybody who walks with one of them. Groups, queues and trains stay as they are;
+# - the null model is a **sample**, too. So the fit asks which pairs are of the data and which of the null model, as a logistic
+#   regression does. Just outside of a zone the null model has few pairs. Taken as exact, it moved the centre by up to 13 cm.
 #
 # The model is that of the respect zone. For the people of chapters 01 to 05 it is one line:
 #

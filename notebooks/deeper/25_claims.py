@@ -438,8 +438,8 @@ Markdown(
 # The semi-axis b, to the sides, is known well. How far the zone reaches behind a person is not: if you are behind me, I am
 # ahead of you. So the longer front of your zone hides the back of mine. Then the centre and the semi-axis a are wrong by several
 # centimetres in opposite directions, and their sum, the reach ahead, is nearly right. The posterior alone was too narrow
-# for this. So it carries an error of the model as well, measured on other plazas: a standard deviation of at least 5 cm
-# along the motion, and 1.8 cm for the semi-axis across.
+# for people who differ from the model. So it carries an error of the model as well, measured on crowds that walk by other
+# rules: a standard deviation of at least 3 cm along the motion, and 1.2 cm for the semi-axis across.
 #
 # **A common mistake:** "the 95 % interval contains the true zone with 95 %". No: it does so only if the method aims at
 # the true zone. The quantile zone aims at a quantile, not at the true edge.
@@ -493,8 +493,11 @@ Markdown(
     f"""<details><summary>Answer</summary>
 
 {false_alarms} of {judged}. A tracker that merges people leaves no pair nearer than it resolves, so p is small. But its tracks end beside
-other people, and the verdict says so. Where a zone is kept, the intervals hold it in nearly every crowd. They are wider than
-they need to be here: these people differ less from the model than the people on real paths, for whom its error is set.
+other people, and the verdict says so. Where a zone is kept, the intervals hold it in nearly every crowd.
+
+On that day the null model was still taken as exact, and the error of the model was 5 cm. With today's method, which takes both
+as samples, the intervals of a hold the truth in 39 of 40 default plazas, 40 of 40 crowds of 970 pairs that swerve, and 36 of
+37 of as many pairs by ORCA, and are 4 cm narrower on each side.
 
 </details>"""
 )
