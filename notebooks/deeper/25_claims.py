@@ -438,8 +438,8 @@ Markdown(
 # The semi-axis b, to the sides, is known well. How far the zone reaches behind a person is not: if you are behind me, I am
 # ahead of you. So the longer front of your zone hides the back of mine. Then the centre and the semi-axis a are wrong by several
 # centimetres in opposite directions, and their sum, the reach ahead, is nearly right. The posterior alone was too narrow
-# for people who differ from the model. So it carries an error of the model as well, measured on crowds that walk by other
-# rules: a standard deviation of at least 3 cm along the motion, and 1.2 cm for the semi-axis across.
+# for people who differ from the model, and for noise. So it carries an error of the model as well, measured on crowds that walk
+# by other rules and on noisy plazas: a standard deviation of at least 3 cm along the motion, and 1.8 cm across.
 #
 # **A common mistake:** "the 95 % interval contains the true zone with 95 %". No: it does so only if the method aims at
 # the true zone. The quantile zone aims at a quantile, not at the true edge.
