@@ -285,7 +285,9 @@ def test_damaged_magni_files_are_refused(tmp_path: Path) -> None:
         szlib.read_tracks(tmp_path / "missing.csv")
     bad = rows.index % 100 == 3
     rows.assign(x=np.where(bad, np.nan, rows["x"])).to_csv(file, index=False)
-    with pytest.warns(szlib.DataWarning, match=f"{bad.sum()} x missing or not a number"):
+    with pytest.warns(
+        szlib.DataWarning, match=f"{bad.sum()} x missing or not a number"
+    ):
         assert funnels.get(szlib.read_tracks(file))[0]["rejected"] == {
             "missing or not a number": bad.sum()
         }
