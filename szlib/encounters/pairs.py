@@ -224,7 +224,7 @@ class Crowd:
         found = find_neighbours(rows.place, moment, r_max + _MARGIN)
         pairs = np.concatenate(list(found), axis=1)
         pairs = pairs[:, np.diff(group[rows.person][pairs], axis=0)[0] != 0]
-        # Who has just come into the area may have been nearer nearly a second ago.
+        # A person who has just come into the area may have been nearer almost a second ago.
         pairs = pairs[:, _likely_nearest(rows, pairs, 1.0) < r_max + _TURN]
         near = np.sort(self.coarse[pairs], axis=0)  # rows are in the order of people
         one, other = self.rows.person[near]

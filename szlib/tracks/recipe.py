@@ -148,6 +148,11 @@ class Recipe:
         """Whether it says how positions become metres."""
         return bool(self.metres or self.homography or self.origin)
 
+    @property
+    def names_people(self) -> bool:
+        """Whether it names the columns of id, x and y."""
+        return {"id", "x", "y"} <= set(self.columns or ())
+
     def over(self, base: Recipe) -> Recipe:
         """This recipe, completed by values of `base` where it has none."""
         own, more = self.as_json(), base.as_json()

@@ -153,7 +153,7 @@ def load_rows(
 
     Raises DataError where columns are missing or unclear, or a value of the recipe does not fit.
     """
-    is_told = {"id", "x", "y"} <= set(recipe.columns or {})
+    named = recipe.names_people
     recipe = find_columns(source, recipe)
     values = {k: column_of(source, at) for k, at in (recipe.columns or {}).items()}
     if len({len(each) for each in values.values()}) > 1:
@@ -176,7 +176,7 @@ def load_rows(
         text = values["day"].cast(pl.String).str.strip_chars(' "')
         day = text.set(text == "", None)
     elif not is_head and recipe.file_format == "tidy":
-        ask_about_recordings(source, recipe, table, by_name=not is_told)
+        ask_about_recordings(source, recipe, table, by_name=not named)
     table = to_metres(table.with_columns(ragged=is_ragged), recipe, path)
     if day is not None:
         table = table.with_columns(day=day)

@@ -146,11 +146,11 @@ def recognise(head: str, path: Path, recipe: Recipe) -> Shape:
     require_format(recipe)
     first = head.partition("\n")[0].strip()
     fields = split_line(first, find_separator(first))
-    is_told = {"id", "x", "y"} <= set(recipe.columns or ())
+    named = recipe.names_people
     fitting = (
         shape
         for shape in SHAPES.values()
-        if not (is_told and "id" in (shape.recipe.columns or {}) and not shape.parse)
+        if not (named and "id" in (shape.recipe.columns or {}) and not shape.parse)
         and set(shape.header) <= set(fields)
         and re.match(shape.begins, head, re.MULTILINE)
         and re.match(shape.file, path.name)

@@ -51,7 +51,7 @@ class Estimator(ABC):
         """Fit the zone to all encounters at `speeds`, ascending [m/s]."""
 
     def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
-        """Fit ellipses to weighted encounters; an estimator with a posterior needs not.
+        """Fit ellipses to weighted encounters; an estimator with a posterior is not asked.
 
         Parameters
         ----------

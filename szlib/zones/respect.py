@@ -56,7 +56,8 @@ from .respect_likelihood import COLUMNS, Likelihood, PairPaths, zone_ellipses
 from .sampling import Draws
 
 # Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
-# a row, for other reasons than respect, which a shift in time removes as well. Who stands has no heading.
+# a row, for other reasons than respect, which a shift in time removes as well. A person who stands has no
+# heading.
 _KINDS = ("opposite", "crossing")
 # Twice the logarithm of the posterior density of a zone over that of none. Without respect: up to 19 in 45
 # crowds of 9 kinds with 500 to 1,700 pairs (singles, groups, trains, turnstiles, signals and others). With a

@@ -2,10 +2,10 @@
 
     python tests/benchmarks/truth/calibration.py 200
 
-Parameters are drawn from the prior, and encounters from the model with these parameters: those of many people
-who ignore each other, each as probable as its factor g(h). The null model is another sample of these people.
-If the posterior is right, the rank of the true parameter among
-draws from it is uniform. A Kolmogorov-Smirnov test says so for each of the twelve parameters.
+Parameters are drawn from the prior. Many encounters of people who ignore each other are simulated. The data
+is a sample of them in which each is as probable as its factor g(h), the null model is a plain sample. If the
+posterior is right, the rank of the true parameter among draws from it is uniform. A Kolmogorov-Smirnov test
+says so for each of the twelve parameters.
 """
 
 from __future__ import annotations
