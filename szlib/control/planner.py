@@ -59,12 +59,12 @@ _FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
 # Largest multiplier of the speed limit. Rows that contradict each other give huge ones, which would spoil
 # the next steps.
 _MOST_CURVED = 1e3
-_MOST_PROBLEMS = 256  # numbers of obstacles for which a planner keeps what it has built
-_EQUAL, _SOFT = 5, 8  # DAQP's kinds of constraints
+_MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
+_HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 # DAQP's answers; the second one if it violates rows with a price
 _SOLVED, _VIOLATED = 1, 2
 # No regularisation of convex programs; beside the exact penalty, a negligible quadratic one.
-_DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
+_DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3, "eq_reduction": -1}
 
 
 class Plan(NamedTuple):
@@ -158,8 +158,9 @@ class Program(LinearProblem):
         each *= np.array(s.step_lengths)[k]
         self.prices[self.first :] = each.clip(max=HARD_PRICE)
         self._is_hard = s.decay_price >= HARD_PRICE
-        self._hard = np.zeros(len(self.lower), np.intc)
-        self._hard[3 * s.N : self.first] = _EQUAL
+        self._sense = np.where(self.prices > 0, _SOFT, _HARD).astype(np.intc)
+        self._sense[3 * s.N : self.first] = _EQUAL
+        self._models = dict[Any, Any]()
 
     def solve(self) -> tuple[Array, bool] | None:
         """The change of least cost by the priorities, True if it is relaxed; sets the multipliers of speed.
@@ -169,7 +170,7 @@ class Program(LinearProblem):
         rows: Any = slice(None)
         if len(self.levels) > _FEW_ROWS:
             rows = np.flatnonzero(self.lower > self.near)
-        found = self._solve_rows(rows, self.lower, self.prices)
+        found = self._solve_rows(rows, self.lower, self.prices, self._sense)
         is_relaxed = found is None or (found[2] and self._is_hard)
         if found is None:
             found = self._solve_levels(np.arange(len(self.lower))[rows])
@@ -181,42 +182,52 @@ class Program(LinearProblem):
         return found[0], is_relaxed
 
     def _solve_rows(
-        self, rows: Any, lower: Array, prices: Array
+        self, rows: Any, lower: Array, prices: Array, sense: NDArray[np.intc]
     ) -> tuple[Array, Array, bool] | None:
         """d, the multipliers of the rows, and whether rows with a price are violated.
 
-        Of the problem it has these rows, with other lower bounds and prices; without a price a row is hard.
-        None if hard rows contradict each other.
+        Of the problem it has these rows, with other lower bounds, prices, and kinds of constraints. None if
+        hard rows contradict each other. To change a model of DAQP takes half the time of a new one, and its
+        answers are the same; the number of rows with a price must not change, because it sizes the memory.
         """
-        weights = prices[rows]
-        sense = np.where(weights > 0, _SOFT, self._hard[rows])
-        slopes = self.slopes[rows][self.inputs.size :]
-        model = daqp.Model()
-        model.settings = _DAQP
+        weights, slopes = prices[rows], self.slopes[rows][self.inputs.size :]
         given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
-        if model.setup(*given, sense)[0] < 0:
+        size = len(weights), np.count_nonzero(weights)
+        model = self._models.pop(size, None)
+        if model is None:
+            model = daqp.Model()
+            model.settings = _DAQP
+            flag, _ = model.setup(*given, sense[rows])
+        else:
+            flag = model.update(*given, sense[rows])
+        if flag < 0:
             return None
         model.soft_weights(w_l=weights, w_u=weights)
         step, _, flag, info = model.solve()
-        is_solved = flag in (_SOLVED, _VIOLATED)
-        return (step, info["lam"], flag == _VIOLATED) if is_solved else None
+        if flag not in (_SOLVED, _VIOLATED):
+            return None
+        if len(self._models) < _MOST_PROBLEMS:
+            self._models[size] = model
+        return step, info["lam"], flag == _VIOLATED
 
     def _solve_levels(self, near: NDArray[np.intp]) -> tuple[Array, Array, bool] | None:
         """Level by level: the least violation, which is fixed for the next levels."""
-        found, lower, prices = None, self.lower.copy(), self.prices.copy()
+        found, lower = None, self.lower.copy()
+        prices, sense = self.prices.copy(), self._sense.copy()
         chosen, near = np.split(near, [self.first])
         levels = self.levels[near - self.first]
         for level in np.unique(levels):
             rows = near[levels == level]
             prices[rows] = np.where(prices[rows] > 0, prices[rows], HARD_PRICE)
+            sense[rows] = _SOFT
             chosen = np.concatenate([chosen, rows])
-            solved = self._solve_rows(chosen, lower, prices)
+            solved = self._solve_rows(chosen, lower, prices, sense)
             if solved is None:
                 break
             found = solved
             left = lower[rows] - self.slopes[rows] @ found[0]
             lower[rows] -= np.maximum(left, 0.0) + 1e-9
-            prices[rows] = 0.0
+            prices[rows], sense[rows] = 0.0, _HARD
         return found
 
     def is_violated(self) -> bool:
