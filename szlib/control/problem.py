@@ -188,35 +188,43 @@ def list_conditions(
     return tuple(found)
 
 
+def _write_conditions(
+    s: MPCSettings, kind: type[Obstacle], has_floors: bool, numbers: Any, at: Any
+) -> Any:
+    """Values of the conditions on an obstacle of a `kind`, in symbols: satisfied where they are >= 0.
+
+    Parameters
+    ----------
+    s, kind, has_floors : as of `list_conditions`.
+    numbers : of the obstacle, and its offset.
+    at : positions of the robot, shape (2, N+1).
+    """
+    *own, offset = ca.vertsplit(numbers)
+    h = [
+        kind.distance(at[0, k], at[1, k], time, *own) - offset
+        for k, time in enumerate(s.times)
+    ]
+    conditions = list_conditions(s, kind, has_floors)
+    found = [
+        h[k + 1] - keep * h[k]
+        for each in conditions
+        for k, keep in enumerate(each.keep)
+    ]
+    return ca.vertcat(*found)
+
+
 @lru_cache(maxsize=1024)
 def _linearise_kind(
     settings: MPCSettings, kind: Any, has_floors: bool, n: int, count: int
 ) -> Any:
     """(positions, numbers and offsets) -> (bounds, slopes) of all conditions on `n` obstacles of a kind."""
-    horizon, conditions = (
-        build_horizon(settings),
-        list_conditions(settings, kind, has_floors),
-    )
-    n_states = max(len(each.keep) for each in conditions) + 1
-    at, numbers = ca.SX.sym("at", 2, n_states), ca.SX.sym("numbers", count + 1)
-    x, y, t = (ca.SX.sym(name) for name in "xyt")
-    *own, offset = ca.vertsplit(numbers)
-    h = kind.distance(x, y, t, *own) - offset
-    outputs = [h, ca.jacobian(h, ca.vertcat(x, y))]
-    once = ca.Function("h", [x, y, t, numbers], outputs)
-    found = [
-        once(at[0, k], at[1, k], settings.times[k], numbers) for k in range(n_states)
-    ]
-    bounds, slopes = list[Any](), list[Any]()
-    for condition in conditions:
-        for k, keep in enumerate(condition.keep):
-            bounds.append(keep * found[k][0] - found[k + 1][0])
-            slope = ca.kron(horizon.to_positions[k], found[k + 1][1])
-            if k and keep:  # the first state is given
-                slope -= keep * ca.kron(horizon.to_positions[k - 1], found[k][1])
-            slopes.append(slope.T)
-    rows = [ca.vertcat(*bounds), ca.densify(ca.horzcat(*slopes))]
-    of_one = ca.Function("rows", [at, numbers], rows, {"cse": True})
+    at, numbers = ca.SX.sym("at", 2, settings.N + 1), ca.SX.sym("numbers", count + 1)
+    values = _write_conditions(settings, kind, has_floors, numbers, at)
+    # the first state is given
+    moves = ca.DM(np.kron(build_horizon(settings).to_positions, np.eye(2)))
+    slopes = (ca.jacobian(values, ca.vec(at[:, 1:])) @ ca.sparsify(moves)).T
+    results = [-values, ca.densify(slopes)]
+    of_one = ca.Function("rows", [at, numbers], results, {"cse": True})
     return of_one.map(n, [True, False], [False, False])
 
 
@@ -396,16 +404,7 @@ def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
     for kind, n, count in shapes:
         own = ca.SX.sym(kind.kind, count + 1, n)
         numbers.append(ca.vec(own))
-        for i in range(n):
-            *each, offset = ca.vertsplit(own[:, i])
-            h = [
-                kind.distance(x[0, k], x[1, k], s.times[k], *each) - offset
-                for k in range(s.N + 1)
-            ]
-            for condition in list_conditions(s, kind, has_floors=False):
-                rows += [
-                    h[k + 1] - keep * h[k] for k, keep in enumerate(condition.keep)
-                ]
+        rows += [_write_conditions(s, kind, False, own[:, i], x) for i in range(n)]
     rows.append(s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T)
     if s.terminal == "rest":
         rows.append(x[2:, s.N])
