@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from szlib.tracks.readers import open_file, rejection_reason
+from szlib.tracks.readers import open_rows, select_usable
 from szlib.tracks.recipe import Recipe, find_recipe
 
 STANDING = 0.1
@@ -75,8 +75,8 @@ def measure_frame_intervals(path: str | Path, recipe: Recipe | None = None) -> n
     >>> measure_frame_intervals("stand.csv")
     array([0.5, 1. ])
     """
-    with open_file(path := Path(path), find_recipe([path], recipe)) as (_, scan):
-        frames = scan.select(pl.col("t").drop_nulls().unique()).collect(engine="streaming")["t"]
+    with open_rows(path := Path(path), find_recipe([path], recipe)) as rows:
+        frames = rows.table.select(pl.col("t").drop_nulls().unique()).collect(engine="streaming")["t"]
     return np.asarray(np.diff(np.sort(frames.to_numpy())))
 
 
@@ -105,11 +105,8 @@ def summarise_people(path: str | Path, recipe: Recipe | None = None) -> pd.DataF
 @contextmanager
 def _usable_rows(path: str | Path, recipe: Recipe | None) -> Iterator[tuple[Recipe, pl.LazyFrame]]:
     """The recipe of a file, and a scan of its usable rows: id, t [s], x, y [m], and what else it holds."""
-    with open_file(path := Path(path), find_recipe([path], recipe)) as (found, scan):
-        yield (
-            found,
-            scan.filter(rejection_reason(scan).is_null()),
-        )
+    with open_rows(path := Path(path), find_recipe([path], recipe)) as rows:
+        yield rows.recipe, select_usable(rows.table)
 
 
 def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "UTC") -> pd.DataFrame:

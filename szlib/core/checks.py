@@ -1,14 +1,16 @@
-"""Checks of arguments: numbers of the right shape and range, tables with their columns."""
+"""Checks of arguments: numbers and arrays of the right shape and range, tables with their columns."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DataError, SolverError, SzlibError
+from .errors import DataError, SolverError
+from .input_files import require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,27 +20,6 @@ Array = NDArray[np.float64]  # an array of floats
 # well below the tolerance of the controller. Every map projection of the Earth stays below it.
 LARGEST = 1e8
 _DOUBLE = np.dtype(float)
-
-
-def require(
-    holds: object,
-    name: str,
-    value: object,
-    expected: str,
-    error: type[SzlibError] = DataError,
-) -> None:
-    """Raise `error` if the check of an argument does not hold: "`name` must be `expected`; got `value`".
-
-    Parameters
-    ----------
-    holds : whether the argument is valid.
-    name : of the argument.
-    value : of the argument.
-    expected : what it must be.
-    error : class of the error.
-    """
-    if not holds:
-        raise error(f"{name} must be {expected}; got {value!r}")
 
 
 def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:
@@ -83,22 +64,19 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     ------
     SolverError : another shape, not numbers, not finite, or beyond +-`LARGEST`.
     """
-    try:
-        array = np.asarray(value)  # ValueError for rows of several lengths
-        if array.dtype.kind not in "iuf":
-            raise ValueError(array.dtype)
-    except ValueError as error:
-        expected = f"numbers of shape {shape}".replace("Ellipsis", "...")
-        raise SolverError(f"{name} must be {expected}; got {value!r}") from error
+    array = np.array("rows of several lengths")
+    with suppress(ValueError):
+        array = np.asarray(value)
+    expected = f"numbers of shape {shape}".replace("Ellipsis", "...")
+    require(array.dtype.kind in "iuf", name, value, expected, SolverError)
     fits = array.shape == shape
     if ... in shape:
         fits = array.shape[max(0, array.ndim - len(shape) + 1) :] == shape[1:]
     if not fits:
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)
-    if not np.abs(array).max(initial=0.0) <= LARGEST:
-        if not np.isfinite(array).all():
-            raise SolverError(f"{name} must be finite; got {array.tolist()}")
+    require(np.isfinite(array).all(), name, array.tolist(), "finite", SolverError)
+    if np.abs(array).max(initial=0.0) > LARGEST:
         raise SolverError(
             f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin"
         )

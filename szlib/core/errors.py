@@ -51,10 +51,10 @@ class MemoryLimitError(DataError):
 
     Examples
     --------
-    >>> from szlib.core import memory
+    >>> from szlib.core.input_files import granted_memory, require_memory
     >>> try:
-    ...     with memory.granted(10**9):
-    ...         memory.require(5e9, "the table")
+    ...     with granted_memory(10**9):
+    ...         require_memory(5e9, "the table")
     ... except szlib.MemoryLimitError as error:
     ...     print(error)
     the table takes about 5.0 GB of memory, and the limit is 1.0 GB; ...

@@ -17,7 +17,7 @@ import time
 import uuid
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
@@ -25,21 +25,15 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from .errors import StorageError
-from .input_files import open_regular, read_small
+from .input_files import explained, open_regular, read_json_object, read_small
 
 MARKER = ".szlib"  # name of the file that marks a folder as szlib's
 _LOCK, _UNFINISHED, _TEMPORARY = ".szlib-lock", ".szlib-part-", "szlib-"
 # age at which an unfinished file is removed [s]: no write takes so long
 _ABANDONED = 3600.0
-
-
-@contextmanager
-def _explain_errors(what: str, advice: str) -> Iterator[None]:
-    """Raise an error of the file system as StorageError: `what` failed, the reason, and `advice`."""
-    try:
-        yield
-    except OSError as error:
-        raise StorageError(f"{what} ({error.strerror or error}); {advice}") from error
+# File systems that do not sync folders, and systems that do not open them, give these errors.
+_NOT_SYNCED = (None, errno.EINVAL, errno.EACCES)
+_explained = partial(explained, error=StorageError, faults=OSError)
 
 
 def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) -> None:
@@ -49,9 +43,9 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
     write the same file: one of them wins. The folder must exist. Raises StorageError.
     """
     path, data = Path(path), content.encode() if isinstance(content, str) else content
-    unfinished = path.parent / f"{_UNFINISHED}{uuid.uuid4().hex}"
+    unfinished = path.with_name(f"{_UNFINISHED}{uuid.uuid4().hex}")
     advice = "make room, or choose a folder that is writable; files that were finished before are intact"
-    with _explain_errors(f"{path}: cannot be written", advice):
+    with _explained(f"{path}: cannot be written", advice):
         try:
             _fill(unfinished, data, durable)
             unfinished.replace(path)
@@ -71,21 +65,15 @@ def _fill(unfinished: Path, content: bytes, durable: bool) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Make the names in a folder durable; Windows cannot open folders, and needs nothing."""
+    """Make the names in a folder durable."""
     try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError:
-        return
-    try:
-        os.fsync(handle)
+        with ExitStack() as stack:
+            handle = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, handle)
+            os.fsync(handle)
     except OSError as error:
-        if error.errno not in (
-            None,
-            errno.EINVAL,
-        ):  # a file system that does not sync folders
+        if error.errno not in _NOT_SYNCED:
             raise
-    finally:
-        os.close(handle)
 
 
 def store_cached(path: Path, content: bytes, made_of: Any) -> None:
@@ -100,19 +88,18 @@ def write_checksum(path: Path, content: bytes, made_of: Any) -> None:
     write_file(path.with_name(f"{path.name}.json"), record)
 
 
-def _make_record(content: bytes, made_of: Any) -> dict[str, Any]:
-    return {"made_of": made_of, "sha256": hashlib.sha256(content).hexdigest()}
-
-
 def load_cached(path: Path, made_of: Any) -> bytes | None:
     """The content of `path` from `store_cached`; None if missing, damaged, or not made of `made_of`."""
-    with suppress(OSError, ValueError):
-        record = json.loads(read_small(path.with_name(f"{path.name}.json")))
-        with open_regular(path) as stream:
-            content = stream.read()
+    record = read_json_object(path.with_name(f"{path.name}.json"))
+    with suppress(OSError), open_regular(path) as stream:
+        content = stream.read()
         if record == json.loads(json.dumps(_make_record(content, made_of))):
             return content
     return None
+
+
+def _make_record(content: bytes, made_of: Any) -> dict[str, Any]:
+    return {"made_of": made_of, "sha256": hashlib.sha256(content).hexdigest()}
 
 
 def claim_folder(
@@ -131,19 +118,19 @@ def claim_folder(
     StorageError : the folder is refused, or cannot be made or read.
     """
     folder = Path(folder)
-    with _explain_errors(f"{folder}: cannot be made or read", "choose another folder"):
+    with _explained(f"{folder}: cannot be made or read", "choose another folder"):
         place = folder.resolve()
         if inside := [file for file in inputs if place in file.resolve().parents]:
             raise StorageError(
                 f"{folder}: holds input data, {inside[0].name}; choose a folder without input data"
             )
         folder.mkdir(parents=True, exist_ok=True)
-        owner = folder_purpose(folder)
         foreign = sorted(
             entry.name
             for entry in folder.iterdir()
             if not (entry.name.startswith(MARKER) or (entry / MARKER).is_file())
         )
+        owner = folder_purpose(folder)
         if owner is None and foreign:
             raise StorageError(
                 f"{folder}: holds files that szlib did not write, such as {foreign[0]!r}; choose a new or "
@@ -151,14 +138,14 @@ def claim_folder(
             )
         if owner is None:
             with FileLock(folder / _LOCK):  # of two processes one comes first
-                if (owner := folder_purpose(folder)) is None:
-                    says = "Written by szlib, which may replace every file here."
-                    write_file(folder / MARKER, f"{purpose}\n{says}\n")
+                owner = folder_purpose(folder) or purpose
+                says = "Written by szlib, which may replace every file here."
+                write_file(folder / MARKER, f"{owner}\n{says}\n")
         for entry in folder.glob(f"{_UNFINISHED}*"):  # of processes that were killed
             with suppress(OSError):
                 if time.time() - entry.stat().st_mtime > _ABANDONED:
                     entry.unlink()
-    if owner not in (None, purpose):
+    if owner != purpose:
         raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
     return folder
 
@@ -178,13 +165,14 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
     Raises StorageError where another process has reserved it, or where this one may not write.
     """
     lock = FileLock(Path(folder) / f"{_LOCK}-run", timeout=0)
-    with _explain_errors(f"{folder}: cannot be written", "choose another folder"):
-        try:
-            lock.acquire()
-        except Timeout as error:
-            raise StorageError(
-                f"{folder}: another process is writing there; wait until it ends, or choose another folder"
-            ) from error
+    busy = f"{folder}: another process is writing there"
+    with (
+        _explained(f"{folder}: cannot be written", "choose another folder"),
+        _explained(
+            busy, "wait until it ends, or choose another folder", faults=Timeout
+        ),
+    ):
+        lock.acquire()
     try:
         yield
     finally:
@@ -199,27 +187,25 @@ def temporary_folder() -> Iterator[Path]:
     Raises StorageError where there is no room for it, or the umask forbids its use.
     """
     remove_abandoned_temporary()
-    advice = "make room, or name another one in $TMPDIR"
-    with _explain_errors("no temporary folder", advice):
-        home = Path(tempfile.gettempdir()).resolve(strict=True)
-        folder = home / f"{_TEMPORARY}{os.getpid()}-{uuid.uuid4().hex}"
-        lock = FileLock(f"{folder}{_LOCK}")
-        lock.acquire()
-    try:
-        with _explain_errors("no temporary folder", advice):
+    with ExitStack() as stack:
+        advice = "make room, or name another one in $TMPDIR"
+        with _explained("no temporary folder", advice):
+            home = Path(tempfile.gettempdir()).resolve(strict=True)
+            folder = home / f"{_TEMPORARY}{os.getpid()}-{uuid.uuid4().hex}"
+            lock = FileLock(f"{folder}{_LOCK}")
+            lock.acquire()
+            stack.callback(_remove_temporary, lock)
+            if Path(lock.lock_file).stat().st_mode & 0o600 != 0o600:
+                raise StorageError(
+                    "new files may not be used by their owner (umask); call umask 022 first"
+                )
             folder.mkdir(mode=0o700)
-        if folder.stat().st_mode & 0o700 != 0o700:
-            folder.rmdir()
-            raise StorageError(
-                "new files may not be used by their owner (umask); call umask 022 first"
-            )
         yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        _remove_lock(lock)
 
 
-def _remove_lock(lock: FileLock) -> None:
+def _remove_temporary(lock: FileLock) -> None:
+    """Remove the folder that a `lock` protects, and the lock."""
+    shutil.rmtree(lock.lock_file.removesuffix(_LOCK), ignore_errors=True)
     with suppress(OSError):
         Path(lock.lock_file).unlink()
     lock.release()
@@ -235,19 +221,16 @@ def process_folder() -> Path:
 
 
 def remove_abandoned_temporary() -> None:
-    """Remove temporary folders whose process has ended without removing them."""
+    """Remove temporary folders whose process has ended without removing them.
+
+    With them go the semaphores that joblib left in shared memory when this process was killed.
+    """
     for file in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*{_LOCK}"):
         with suppress(OSError, Timeout):
             lock = FileLock(file, timeout=0)
             lock.acquire()
-            shutil.rmtree(str(file).removesuffix(_LOCK), ignore_errors=True)
-            _remove_semaphores(file.name.split("-")[1])
-            _remove_lock(lock)
-
-
-def _remove_semaphores(number: str) -> None:
-    """Remove the semaphores that joblib left in shared memory when the process `number` was killed."""
-    if Path("/proc/self").exists() and not Path("/proc", number).exists():
-        for semaphore in Path("/dev/shm").glob(f"sem.loky-{number}-*"):
-            with suppress(OSError):
-                semaphore.unlink()
+            number = file.name.split("-")[1]
+            _remove_temporary(lock)
+            if Path("/proc/self").exists() and not Path("/proc", number).exists():
+                for semaphore in Path("/dev/shm").glob(f"sem.loky-{number}-*"):
+                    semaphore.unlink(missing_ok=True)

@@ -1,4 +1,9 @@
-"""Input files: regular, of bounded size, and unchanged while they are read."""
+"""What users give: values of the right kind, regular files that do not change, and the memory that they need.
+
+Before a table is made, its rows are counted and its size is estimated. A table above the limit raises an
+error, so that the machine does not run out of memory. The limit is the amount granted, or four fifths of the
+memory that is available.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +11,96 @@ import errno
 import hashlib
 import json
 import os
+import re
 import stat
 import time
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import (
+    AbstractContextManager,
+    ExitStack,
+    contextmanager,
+    suppress,
+)
 from contextvars import ContextVar
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
-from zipfile import BadZipFile
 
-from .errors import DataError, SzlibError
+import psutil
+
+from .errors import DataError, MemoryLimitError, SzlibError
 
 _TICK = 0.004  # two changes of a file within this time [s] can have the same time stamp (Linux)
-_JOINERS = "\u200c\u200d"  # zero-width letters of Persian, Hindi and emoji, which Python calls not printable
+# Zero-width letters of Persian, Hindi and emoji, which Python calls not printable.
+_JOINERS = "\u200c\u200d"
 _STATE = attrgetter("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
 # The files that `unchanged_files` keeps open, by path.
 _OPEN: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
+
+# Environment variable: the limit of each process, such as 4GB; ``--memory`` of the command line sets it.
+MEMORY_VARIABLE = "SZLIB_MEMORY"
+_SHARE = 0.8
+_granted: ContextVar[int | None] = ContextVar("granted", default=None)
+
+
+def require(
+    holds: object,
+    name: str,
+    value: object,
+    expected: str,
+    error: type[SzlibError] = DataError,
+) -> None:
+    """Raise `error` if the check of an argument does not hold: "`name` must be `expected`; got `value`".
+
+    Parameters
+    ----------
+    holds : whether the argument is valid.
+    name : of the argument.
+    value : of the argument.
+    expected : what it must be.
+    error : class of the error.
+    """
+    if not holds:
+        raise error(f"{name} must be {expected}; got {value!r}")
+
+
+# --- files --------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def explained(
+    what: str,
+    advice: str,
+    error: type[SzlibError] = DataError,
+    faults: type[BaseException] | tuple[type[BaseException], ...] = Exception,
+) -> Iterator[None]:
+    """Raise `faults` in a with block as `error`: `what` failed, the reason, and `advice`.
+
+    Too little memory stays what it is.
+    """
+    try:
+        yield
+    except MemoryLimitError:
+        raise
+    except faults as fault:
+        reason = getattr(fault, "strerror", None) or fault
+        raise error(f"{what} ({reason}); {advice}") from fault
+
+
+def reading(
+    path: Path, what: str, expected: str, error: type[SzlibError] = DataError
+) -> AbstractContextManager[None]:
+    """Raise `error` if the block cannot read the file `path`.
+
+    Parameters
+    ----------
+    path : the file.
+    what : what it is read as, such as "as groups".
+    expected : what the file should be.
+    error : class of the error.
+    """
+    shown = f"{printable(path)}: cannot be read {what}"
+    return explained(shown, f"expected {expected}", error)
 
 
 def open_regular(path: Path) -> BinaryIO:
@@ -48,10 +125,8 @@ def read_small(path: Path, largest: int = 10_000_000) -> bytes:
 
 def read_json_object(path: Path) -> dict[str, Any]:
     """The object in the small JSON file `path`; empty if the file is missing or damaged."""
-    with suppress(OSError, ValueError, RecursionError):
-        content = json.loads(read_small(path))
-        if isinstance(content, dict):
-            return content
+    with suppress(OSError, ValueError, TypeError, RecursionError):
+        return dict(json.loads(read_small(path)))
     return {}
 
 
@@ -64,13 +139,10 @@ def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
     """
     with ExitStack() as stack:
         opened = {}
-        for path in (path for path in paths if path not in _OPEN.get({})):
-            try:
+        for path in set(paths) - _OPEN.get({}).keys():
+            what = f"{printable(path)}: cannot be opened"
+            with explained(what, "expected a file that may be read", faults=OSError):
                 opened[path] = stack.enter_context(open_regular(path))
-            except OSError as error:
-                raise DataError(
-                    f"{printable(path)}: cannot be opened ({error.strerror or error})"
-                ) from error
         before = {path: _states(path, stream) for path, stream in opened.items()}
         token = _OPEN.set({**_OPEN.get({}), **opened})
         try:
@@ -112,37 +184,6 @@ def file_content(file: Path) -> tuple[int, str]:
         return stream.tell(), digest
 
 
-@contextmanager
-def reading(
-    path: Path, what: str, expected: str, error: type[SzlibError] = DataError
-) -> Iterator[None]:
-    """Raise `error` if the block cannot read the file `path`.
-
-    Parameters
-    ----------
-    path : the file.
-    what : what it is read as, such as "as groups".
-    expected : what the file should be.
-    error : class of the error.
-    """
-    try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            raise OSError(errno.EINVAL, "it is no regular file", str(path))
-        yield
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        RecursionError,
-        BadZipFile,
-        zlib.error,
-    ) as fault:
-        raise error(
-            f"{printable(path)}: cannot be read {what} ({fault}); expected {expected}"
-        ) from fault
-
-
 def printable(name: object) -> str:
     """The file name `name` as text for any file and any terminal: bytes that are not UTF-8 are escaped."""
     text = (
@@ -151,3 +192,58 @@ def printable(name: object) -> str:
     return "".join(
         c if c.isprintable() or c in _JOINERS else ascii(c)[1:-1] for c in text
     )
+
+
+# --- memory -------------------------------------------------------------------------------------------
+
+
+def parse_size(text: str) -> int:
+    """Bytes of `text`, such as "4GB", "512 MiB" or "2g"; raises MemoryLimitError for other text."""
+    found = re.fullmatch(
+        r"(\d{1,15}(?:\.\d{1,9})?) ?([KMGT]?)(I?)B?", text.strip().upper(), re.ASCII
+    )
+    number, prefix, binary = found.groups() if found else ("0", "", "")
+    size = float(number) * (1024 if binary else 1000) ** " KMGT".index(prefix or " ")
+    if not 1 <= size < 1e18:
+        raise MemoryLimitError(
+            f"memory {text!r}: expected an amount such as 4GB or 512MB"
+        )
+    return int(size)
+
+
+def memory_limit() -> int:
+    """Bytes that this process may use in total."""
+    text = os.environ.get(MEMORY_VARIABLE)
+    return _granted.get() or (parse_size(text) if text else _available_memory())
+
+
+@contextmanager
+def granted_memory(size: int | None) -> Iterator[None]:
+    """Set the limit to `size` bytes inside a with block; None changes nothing."""
+    token = _granted.set(size or _granted.get())
+    try:
+        yield
+    finally:
+        _granted.reset(token)
+
+
+def require_memory(size: float, what: str) -> None:
+    """Raise MemoryLimitError if `what`, the subject of the message, takes `size` bytes, above the limit."""
+    allowed = memory_limit()
+    if size > allowed:
+        raise MemoryLimitError(
+            f"{what} takes about {size / 1e9:.1f} GB of memory, and the limit is {allowed / 1e9:.1f} GB; "
+            f"split the data by time, or raise the limit (--memory, ${MEMORY_VARIABLE}) if there is more"
+        )
+
+
+def _available_memory() -> int:
+    """Four fifths of the bytes available without swapping; in a Linux container, of its limit (cgroup 2)."""
+    available, group = psutil.virtual_memory().available, "/sys/fs/cgroup/memory"
+    with suppress(OSError, ValueError):  # "max": no limit
+        allowed = float(Path(f"{group}.max").read_text())
+        used = float(Path(f"{group}.current").read_text())
+        statistics = Path(f"{group}.stat").read_text()
+        cached = re.findall(r"^inactive_file (\d+)", statistics, re.M)
+        available = min(available, allowed - used + float(cached[0]))
+    return int(_SHARE * available)

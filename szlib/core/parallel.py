@@ -20,9 +20,9 @@ import joblib
 from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from . import memory
 from .errors import SzlibError
 from .files import process_folder
+from .input_files import explained, granted_memory, memory_limit
 
 # longest wait for the answer of a scheduler, and for its first worker [s]
 _CONNECT_TIMEOUT = 10.0
@@ -47,7 +47,7 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
     """
     done, parent, n_jobs = 0, os.getpid(), limit_jobs(n_jobs, len(tasks))
     jobs = None if n_jobs == 1 else n_jobs
-    share = memory.limit() // max(1, joblib.effective_n_jobs(jobs))
+    share = memory_limit() // max(1, joblib.effective_n_jobs(jobs))
     workers = joblib.Parallel(
         n_jobs=jobs,
         return_as="generator_unordered",
@@ -75,13 +75,12 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
 @contextmanager
 def safe_path() -> Iterator[None]:
     """Start processes inside a with block that import nothing from the current folder."""
-    is_set = bool(os.environ.get("PYTHONSAFEPATH"))
+    before = os.environ.get("PYTHONSAFEPATH", "")  # empty: not set
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
         yield
     finally:
-        if not is_set:
-            os.environ.pop("PYTHONSAFEPATH", None)
+        os.environ["PYTHONSAFEPATH"] = before
 
 
 @contextmanager
@@ -147,7 +146,7 @@ def _run_in_share(
 ) -> Any:
     """Run one task, within `share` bytes of memory on the machine of `parent`, else within its limit."""
     function, positional, named = task
-    with memory.granted(share if parent in (os.getpid(), os.getppid()) else None):
+    with granted_memory(share if parent in (os.getpid(), os.getppid()) else None):
         return function(*positional, **named)
 
 
@@ -161,26 +160,21 @@ def cluster(address: str | None, *, wait: float = _CONNECT_TIMEOUT) -> Iterator[
     if address is None:
         yield None
         return
-    try:
+    advice = "install it with: pip install -e '.[cluster]'"
+    with explained("a scheduler needs Dask", advice, SzlibError, ImportError):
         from distributed import Client
-    except ImportError as error:
-        raise SzlibError(
-            "a scheduler needs Dask; install it with: pip install -e '.[cluster]'"
-        ) from error
-    try:
+    with explained(
+        f"no Dask scheduler answers at {address!r}",
+        "start one with `dask scheduler`, and give its address, such as tcp://10.0.0.1:8786",
+        SzlibError,
+    ):
         client = Client(address, timeout=max(wait, _CONNECT_TIMEOUT))
-    except (OSError, ValueError) as error:
-        raise SzlibError(
-            f"no Dask scheduler answers at {address!r} ({error}); start one with `dask scheduler`, and give "
-            "its address, such as tcp://10.0.0.1:8786"
-        ) from error
     with client:
-        try:
+        with explained(
+            f"no worker joined the scheduler at {address!r} within {wait:g} s",
+            f"start one with `dask worker {address}`, or wait longer, such as --wait 600",
+            SzlibError,
+        ):
             client.wait_for_workers(1, timeout=wait)
-        except TimeoutError as error:
-            raise SzlibError(
-                f"no worker joined the scheduler at {address!r} within {wait:g} s; start one with "
-                f"`dask worker {address}`, or wait longer, such as --wait 600"
-            ) from error
         with joblib.parallel_config("dask"):
             yield client

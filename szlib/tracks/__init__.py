@@ -1,12 +1,12 @@
 """Where people were, and when: files of any format become one table of tracks on one clock.
 
-funnels       how many rows entered each stage, and why others were rejected
-recipe        how files are read: `Recipe`
-shapes        the shapes of files that have a name, each with its recipe
-sources       files and tables as columns: text, Parquet, Feather, SQLite, JSON, those of libraries
-columns       which column holds what
-rows          from columns to rows in seconds and metres
-plausibility  whether people can move as they do in a table; if not, with which recipe they would
+recipe        how files are read: `Recipe`, and the shapes of files that have a name
+sources       files unpacked and recognised; text as columns; large files scanned
+shapes        other files and tables as columns: Parquet, Feather, SQLite, JSON, those of libraries
+funnels       how many rows entered each stage, and why others were rejected; whether people move as they can
+plausibility  with which other recipe people would walk
+columns       which column holds what; from columns to rows in seconds and metres
+recordings    several files: pieces of one recording, or others
 readers       rows of files as they are: `read_raw`
 clock         rows brought to multiples of 0.1 s, with velocities: `read_tracks`, `to_clock`
 datasets      named data and paths, downloads verified by hash

@@ -19,19 +19,17 @@ checks it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from ..core import memory
-from ..core.checks import check_columns, check_rows, require
+from ..core.checks import check_columns, check_rows
 from ..core.errors import DataError
+from ..core.input_files import require, require_memory
 from . import funnels
-from .readers import read_raw
+from .readers import list_sources, read_raw
 from .recipe import SHORTEST_GAP, Recipe, find_recipe
-from .sources import is_table
 
 if TYPE_CHECKING:
     from pedpy import TrajectoryData
@@ -99,9 +97,7 @@ def read_tracks(
     >>> list(tracks.columns), len(tracks)
     (['day', 'id', 't', 'x', 'y', 'vx', 'vy'], 41)
     """
-    sources = (
-        [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
-    )
+    sources = list_sources(paths)
     recipe = find_recipe(sources, recipe, **parameters)
     return _interpolate(
         read_raw(sources, recipe=recipe, exclude=exclude), recipe.max_gap
@@ -151,7 +147,7 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     require(max_gap > SHORTEST_GAP, "max_gap", max_gap, "longer than the clock's 0.1 s")
     within = same & (step <= max_gap + _ROUNDING)
     ticks = float(step.sum(where=within)) * TICKS_PER_SECOND
-    memory.require(
+    require_memory(
         ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows"
     )
     row, columns, n_covered = _on_clock(t, raw[["x", "y"]].to_numpy(float).T, within)
@@ -250,27 +246,27 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     check_rows(tracks, np.abs(t * TICKS_PER_SECOND - tick) < 1e-3, ["t"], expected)
     order, tick, same, step = _order_rows(tracks, tick)
     piece = np.r_[0, np.cumsum(~(same & (step == 1)))]
-    return np.arange(len(t))[order], tick, piece
+    return order, tick, piece
 
 
 def _order_rows(
     frame: pd.DataFrame, time: np.ndarray
-) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray]:
-    """Order of rows by person and `time` (a slice where they are sorted), and the times in that order.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Order of rows by person and `time`, and the times in that order.
 
     Then, of each row but the first: whether it has the same person as the row before, and the time between
     them.  Raises DataError where a person has two rows at one time.
     """
-    person = _person_codes(frame)
-    later = time[1:] >= time[:-1]
-    is_next = (person[1:] > person[:-1]) | (person[1:] == person[:-1]) & later
-    order = slice(None) if is_next.all() else np.lexsort((time, person))
-    person, time = person[order], time[order]
-    same, step = person[1:] == person[:-1], np.diff(time)
-    expected = "this person has two rows at this time; keep one of them"
-    check_rows(
-        frame.iloc[order], np.r_[True, ~same | (step > 0)], ["id", "t"], expected
-    )
+    day = frame["day"].astype("category").cat.codes.to_numpy()
+    person = frame["id"].to_numpy()
+    order = np.lexsort((time, person, day))
+    day, person, time = day[order], person[order], time[order]
+    same = (day[1:] == day[:-1]) & (person[1:] == person[:-1])
+    step = np.diff(time)
+    if (same & (step <= 0)).any():
+        expected = "this person has two rows at this time; keep one of them"
+        is_new = np.r_[True, ~same | (step > 0)]
+        check_rows(frame.iloc[order], is_new, ["id", "t"], expected)
     return order, time, same, step
 
 
@@ -296,15 +292,6 @@ def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
             "without a type count as seconds: divide milliseconds by 1000; if they are seconds, pass max_gap"
         )
     return max_gap
-
-
-def _person_codes(frame: pd.DataFrame) -> np.ndarray:
-    """One integer for each (day, id), ordered by day, then id."""
-    day, person = frame["day"].array, frame["id"].to_numpy()
-    is_new = (person[1:] != person[:-1]) | np.asarray(day[1:] != day[:-1])
-    begins = np.flatnonzero(np.r_[True, is_new])
-    runs = frame[["day", "id"]].iloc[begins].groupby(["day", "id"], observed=True)
-    return np.repeat(runs.ngroup().to_numpy(), np.diff(begins, append=len(person)))
 
 
 # --- other programs -----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Which column of a table holds what, and its values as numbers, times and ids.
+"""From the columns of a file or table to its rows: t [s], id, x, y [m], as a recipe says.
 
 Columns are found by the names given, by usual names, or by how people would walk.
 """
@@ -6,41 +6,165 @@ Columns are found by the names given, by usual names, or by how people would wal
 from __future__ import annotations
 
 import re
-import tomllib
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
 import polars as pl
+from polars import col
 
 from ..core.errors import DataError
 from .plausibility import suggest_columns
-from .recipe import DEGREES, PIXELS, TIME_UNITS, Recipe, advise
-from .sources import Source
+from .recipe import DEGREES, NAMES, PIXELS, SHAPES, TIME_UNITS, Recipe, advise
+from .shapes import open_arrow, open_database, open_json, open_shape
+from .sources import CONTAINERS, File, Rows, Source, recognise
 
-# Usual names of columns and units.
-_NAMES = tomllib.loads(Path(__file__).with_name("names.toml").read_text("utf-8"))
 _CLOCK = re.compile(r"(time|sec|stamp|frame|zeit|hour|minute)")  # in names of times
-_LONGEST_SHARE = (
-    5  # people have so many rows under each value that tells recordings apart
-)
-_FRAMES = 25.0  # a usual frame rate [1/s], to find columns
+# people have so many rows under each value that tells recordings apart
+_LONGEST_SHARE = 5
+_FRAMES = 25.0  # a usual frame rate [1/s], for advice
 _LISTED = 40  # number of columns that are looked at
 _PIXEL = 0.02  # metres in a pixel that an error message shows as an example
 _TRIED = 8  # number of columns that are tried out, with those that are known
 _SAMPLE = 2000  # rows in which columns are guessed
+_DAY = 86_400  # [s]
 
 # Times without a unit whose median is larger count in this unit since 1970: as seconds they would be
 # later than the year 5000.
-_SINCE_1970 = {1e17: "ns", 1e14: "us", 1e11: "ms"}
+_SINCE_1970 = {1e17: "ns", 1e14: "us", 1e11: "ms", 0.0: "s"}
 _DATE = r"^(?:19|20)\d{2}-\d{2}-\d{2}"  # beginning of an ISO time
 _ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
 _EXCEL_1970 = 25_569  # number of the day 1970-01-01 in Excel
 _SHORT = 11  # bits of a hash that are left out: a float holds the others exactly
 _EXACT = 2.0**53  # floats hold smaller whole numbers exactly
+
+
+def open_source(file: File) -> tuple[Source, Recipe]:
+    """The columns of a `file`, and its recipe over that of its shape."""
+    path, recipe, head = file.path, file.recipe, file.head
+    shape = recognise(head, path, recipe)
+    is_free, tables = recipe.file_format is None, list[Source]()
+    if is_free and shape.name == "jupedsim":
+        tables = open_database(file)
+    if any({"frame", "id", "pos_x"} <= set(table.names) for table in tables):
+        tables = []  # PedPy reads them
+    if head.startswith(CONTAINERS):
+        source = open_arrow(file)
+    elif tables:
+        source = _choose_table(tables, recipe)
+    elif head.lstrip().startswith(("{", "[")) and not shape.parse:
+        source = open_json(file)
+    else:
+        source, recipe = open_shape(shape, file)
+        is_free = False
+    if is_free:
+        shape = recognise(",".join(source.names), path, recipe)
+        shape = SHAPES["tidy"] if shape.parse else shape
+    columns = dict(shape.recipe.columns)
+    if columns.get("day") not in source.names:
+        columns.pop("day", None)
+    base = replace(shape.recipe, columns=columns)
+    return source, replace(recipe.over(base), file_format=shape.name)
+
+
+def _choose_table(tables: list[Source], recipe: Recipe) -> Source:
+    """The one of the tables of a database that can be tracks."""
+    readable, refused = [], []
+    for table in tables:
+        try:
+            find_columns(table, recipe)
+            readable.append(table)
+        except DataError as error:
+            refused.append(error)
+    if len(readable) > 1:
+        path = readable[0].where
+        command = f"sqlite3 -header -csv {path.name} 'SELECT * FROM NAME' > tracks.csv"
+        raise DataError(
+            f"{path}: several of the tables {len(tables)} can be tracks; write one to a file: {command}"
+        )
+    if not readable:
+        raise refused[0]
+    return readable[0]
+
+
+def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
+    """The rows of a `source`, read with a `recipe`; `ask` about a column that may tell recordings apart.
+
+    Raises DataError where columns are missing or unclear, or a value of the recipe does not fit.
+    """
+    named, path = recipe.names_people, source.where
+    recipe = find_columns(source, recipe)
+    values = {name: column_of(source, at) for name, at in recipe.columns.items()}
+    t, day = _read_times(values, recipe, source)
+    places = [name for name in ("x", "y", "speed") if name in values]
+    numbers = [to_numbers(values[name], source.decimal).alias(name) for name in places]
+    ids = to_ids(values["id"], path)
+    table = pl.DataFrame([t.alias("t"), ids.alias("id"), *numbers])
+    table = table.with_row_index("line", source.first_line)
+    if "day" in values:
+        text = values["day"].cast(pl.String).str.strip_chars(' "')
+        day = text.set(text == "", None)
+    elif ask and recipe.file_format == "tidy":
+        ask_about_recordings(source, recipe, table, by_name=not named)
+    table = to_metres(table.with_columns(ragged=source.ragged), recipe, path)
+    if day is not None:
+        table = table.with_columns(day=day)
+    if recipe.where:
+        wanted = column_of(source, recipe.where).fill_null(False)
+        table = table.filter(wanted | table["ragged"])
+    return Rows(path, recipe, table.lazy(), source)
+
+
+def _read_times(
+    values: dict[str, pl.Series], recipe: Recipe, source: Source
+) -> tuple[pl.Series, pl.Series | None]:
+    """The times [s]; and the local date of each, where the file states its zone."""
+    if "frame" in values:
+        frames = to_numbers(values["frame"], source.decimal)
+        return frames * (1 / (recipe.frame_rate or 1.0)), None
+    t, day = to_times(values["t"], recipe.tz or "UTC", recipe.time_unit, source.decimal)
+    if recipe.file_format == "lace-lhmp":  # may count from midnight of the day MMDD
+        with suppress(ValueError):
+            date = datetime.strptime(f"2012{source.where.name[:4]}", "%Y%m%d")
+            midnight = date.replace(tzinfo=ZoneInfo("Asia/Tokyo")).timestamp()
+            t += midnight * (t < _DAY).cast(pl.Float64)
+    return t, None if recipe.tz else day
+
+
+def to_metres(table: pl.DataFrame, recipe: Recipe, path: Path) -> pl.DataFrame:
+    """The `table` of file `path` with x, y (and speed) in metres, as a `recipe` says."""
+    x, y, origin = col.x, col.y, recipe.origin
+    if recipe.homography:
+        u, v, w = (a * x + b * y + c for a, b, c in recipe.homography)
+        return table.with_columns(x=u / w, y=v / w)
+    if origin is None and recipe.unit == DEGREES:
+        middle = table.select(x.median(), y.median()).row(0)
+        advice = advise(origin=[round(degree or 0.0, 2) for degree in middle])
+        raise DataError(
+            f"{path}: positions are longitude and latitude; pass origin=, the longitude and latitude of "
+            f"the point (0, 0), the same for all files of one place: {advice}"
+        )
+    if origin:
+        east, north = metres_in_degree(origin[1])
+        return table.with_columns(x=(x - origin[0]) * east, y=(y - origin[1]) * north)
+    return table.with_columns(col("^(x|y|speed)$") * recipe.metres)
+
+
+def metres_in_degree(latitude: float) -> tuple[float, float]:
+    """Metres in a degree of longitude, and of latitude, at a `latitude` on the ellipsoid of WGS 84."""
+    phi, axis, eccentricity = np.radians(latitude), 6_378_137.0, 6.694_379_990_14e-3
+    root = np.sqrt(1 - eccentricity * np.sin(phi) ** 2)
+    north = axis * (1 - eccentricity) / root**3
+    return float(np.radians(axis * np.cos(phi) / root)), float(np.radians(north))
+
+
+# --- which column holds what --------------------------------------------------------------------------
 
 
 def find_columns(source: Source, recipe: Recipe) -> Recipe:
@@ -51,60 +175,54 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
     DataError : a column is missing, doubled or ambiguous, frames have no rate, pixels no scale, degrees no
         origin; it says which columns look like what.
     """
-    names, where = source.names, source.where + source.head
-    given = dict(recipe.columns or {})
+    names, where, given = source.names, f"{source.where}{source.head}", recipe.columns
+    found, missing = dict(given), list[str]()
     for k in given.values():
         if isinstance(k, int) and not 0 <= k < len(names):
             raise DataError(
                 f"{where} has no field {k}; it has {len(names)}, the first is 0"
             )
     at = {
-        quantity: _candidates(quantity, given, names) for quantity in _NAMES["columns"]
+        quantity: _candidates(quantity, recipe, names) for quantity in NAMES["columns"]
     }
-    is_free = "t" not in given and bool(at["frame"])
+    is_free = "t" not in given and at["frame"]
     is_frame = is_free and (not at["t"] or recipe.frame_rate is not None)
     time = "frame" if "frame" in given or is_frame else "t"
-    needed = [time, "id", "x", "y", *(["day"] if at["day"] else [])]
-    for quantity in needed:
-        same = sorted(map(str, set(at[quantity])))
-        if len(same) > 1:
-            advice = advise(columns={**given, quantity: at[quantity][0]})
-            raise DataError(
-                f"{where}: {', '.join(same)} can all be {quantity}; {advice}"
-            )
+    for quantity in (time, "id", "x", "y", *(["day"] if at["day"] else [])):
         if len(at[quantity]) > 1:
-            raise DataError(f"{where} names {same[0]} twice; rename one of them")
-    found = given | {quantity: at[quantity][0] for quantity in needed if at[quantity]}
-    if missing := [quantity for quantity in needed if quantity not in found]:
-        known = ", ".join(map(repr, [n or k for k, n in enumerate(names)][:12]))
-        advice = suggest_reading(source, replace(recipe, columns=found or None))
-        columns = given | dict.fromkeys(missing, "...")
+            same = sorted(map(str, set(at[quantity])))
+            advice = advise(columns={**given, quantity: at[quantity][0]})
+            unclear = f"{', '.join(same)} can all be {quantity}; {advice}"
+            twice = f"names {same[0]} twice; rename one of them"
+            raise DataError(f"{where}: {unclear if len(same) > 1 else twice}")
+        if at[quantity]:
+            found[quantity] = at[quantity][0]
+        else:
+            missing.append(quantity)
+    if missing:
+        known = ", ".join(repr(name or k) for k, name in enumerate(names[:12]))
+        advice = suggest_reading(source, replace(recipe, columns=found))
+        columns = found | dict.fromkeys(missing, "...")
         advice = advice or f"it has {known}; {advise(columns=columns)}"
         raise DataError(f"{where} has no column {', '.join(missing)}; {advice}")
-    keys = {q: _split_unit(at) for q, at in found.items() if at in names}
-    units = {_NAMES["units"].get(keys[c][1]) if c in keys else None for c in "xy"}
-    if all(
-        c in keys and keys[c][0] in _NAMES["kinds"]["degrees"].split() for c in "xy"
-    ):
-        units = {DEGREES}
-    recipe = Recipe(columns=found).over(recipe)
-    clock = _NAMES["time_units"].get(keys.get("t", ("", ""))[1])
-    if clock and not recipe.time_unit and recipe.frame_rate is None:
-        recipe = replace(recipe, time_unit=clock)
-    if not (recipe.unit or recipe.has_places) and len(units) == 1:
-        recipe = replace(recipe, unit=units.pop())
+    stated = {q: _split_unit(name)[1] for q, name in found.items() if name in names}
+    units = {NAMES["units"].get(stated.get(name)) for name in "xy"}
+    unit = units.pop() if len(units) == 1 else None
+    clock = NAMES["time_units"].get(stated.get("t"))
+    recipe = recipe.over(Recipe(columns=found, time_unit=clock, unit=unit))
     _require_known(where, recipe)
     return recipe
 
 
 def _require_known(where: str, recipe: Recipe) -> None:
     """Raise DataError where frames have no rate, times have one, or pixels no scale."""
-    columns, guesses, missing = dict(recipe.columns or {}), dict[str, object](), []
+    columns, guesses = recipe.columns, dict[str, float]()
     if "t" in columns and recipe.frame_rate is not None:
         raise DataError(
             f"{where}: its times are in seconds; leave frame_rate out, or name the column that counts "
             f"frames: {advise(columns={'frame': columns['t']})}"
         )
+    missing = []
     if "frame" in columns and recipe.frame_rate is None:
         guesses["frame_rate"] = _FRAMES
         missing.append(
@@ -117,10 +235,8 @@ def _require_known(where: str, recipe: Recipe) -> None:
             "pixels to the floor"
         )
     if missing:
-        numbers = " and ".join(f"{value:g}" for value in guesses.values())
-        verb = "are only guesses" if len(guesses) > 1 else "is only a guess"
         raise DataError(
-            f"{where}: {'; '.join(missing)}; {numbers} {verb}: {advise(**guesses)}"
+            f"{where}: {'; '.join(missing)}; this is only a guess: {advise(**guesses)}"
         )
 
 
@@ -131,21 +247,18 @@ def column_of(source: Source, at: str | int) -> pl.Series:
     if at in source.names:
         return source.column(source.names.index(at))
     known = {name or f"f{k}": k for k, name in enumerate(source.names)}
+    lacks = f"{source.where} has no column {at}"
     try:
         sum_ = pl.sql_expr(at)
         roots = sum_.meta.root_names()
         if not roots or not set(roots) <= known.keys():
-            raise DataError(
-                f"{source.where} has no column {at}; it has {list(known)[:12]}"
-            )
+            raise DataError(f"{lacks}; it has {list(known)[:12]}")
         columns = {root: source.column(known[root]) for root in roots}
         if not re.search(r"\|\||'", at):
             columns = {k: to_numbers(v, source.decimal) for k, v in columns.items()}
         return pl.DataFrame(columns).select(sum_.alias("c")).to_series()
     except pl.exceptions.PolarsError as error:
-        raise DataError(
-            f"{source.where} has no column {at}, and it is no sum of columns ({error})"
-        ) from error
+        raise DataError(f"{lacks}, and it is no sum of columns ({error})") from error
 
 
 def ask_about_recordings(
@@ -157,16 +270,14 @@ def ask_about_recordings(
     `by_name` one is also asked about if it has a usual name, and people are seen under several of its values.
     `rows` has id and t of all rows.
     """
-    step = pl.col("t").diff()
+    step = col.t.diff()
     is_mixed = rows.select((step.over("id") <= 0).any()).item()
-    columns = recipe.columns or {}
-    used = " ".join(map(str, columns.values()))
+    used = " ".join(map(str, recipe.columns.values()))
     for k, name in enumerate(source.names):
-        key = _split_unit(name)[0]
-        is_usual = by_name and key in _NAMES["kinds"]["recordings"].split()
-        if (name or f"f{k}") in used or k in columns.values() or _CLOCK.search(key):
-            continue
-        if not (is_mixed or is_usual):
+        key, shown = _split_unit(name)[0], name or f"f{k}"
+        is_usual = by_name and key in NAMES["kinds"]["recordings"].split()
+        is_used = shown in used or k in recipe.columns.values() or _CLOCK.search(key)
+        if is_used or not (is_mixed or is_usual):
             continue
         table = rows.select("id", "t", c=source.column(k).cast(pl.String))
         n_pieces = table.select("id", "c").n_unique()
@@ -185,49 +296,44 @@ def _split_unit(name: object) -> tuple[str, str]:
     """A name without blanks, accents and capitals, and its unit: ("posx", "mm") of "Pos X [mm]"."""
     letters = unicodedata.normalize("NFKD", str(name).casefold())
     words = re.findall(r"[^\W_]+", letters)
-    units = _NAMES["units"] | _NAMES["time_units"]
-    has_unit = len(words) > 1 and words[-1] in units
-    unit = words.pop() if has_unit else ""
-    return "".join(words), unit
+    is_unit = words[-1:] and words[-1] in NAMES["units"] | NAMES["time_units"]
+    unit = words.pop() if is_unit and len(words) > 1 else ""
+    key = "".join(words)
+    return key, "deg" if key in NAMES["kinds"]["degrees"].split() else unit
 
 
-def _candidates(
-    quantity: str, given: Mapping[str, str | int], names: Sequence[str]
-) -> list[str | int]:
+def _candidates(quantity: str, recipe: Recipe, names: Sequence[str]) -> list[str | int]:
     """The columns that can hold a quantity: the one given, those with its name, or with a usual one."""
-    at = given.get(quantity, quantity)
+    at = recipe.columns.get(quantity, quantity)
     if same := [name for name in names if name == at]:
         return list(same)
-    if quantity in given:
+    if quantity in recipe.columns:
         is_sum = isinstance(at, int) or re.search(r"[-+*/|(]", at)
         return [at] if is_sum else []
-    usual = {_split_unit(each)[0] for each in _NAMES["columns"][quantity].split()}
+    usual = {_split_unit(each)[0] for each in NAMES["columns"][quantity].split()}
     return [name for name in names if _split_unit(name)[0] in usual]
 
 
-def suggest_reading(source: Source, recipe: Recipe) -> str:
+def suggest_reading(source: Source | None, recipe: Recipe) -> str:
     """As which columns of a `source` people would walk, and how to read them; empty where there are none.
 
     The columns in the `recipe` are taken as they are.  A constant column is none of the others.
     """
-    found = recipe.columns or {}
-    quantities = ("frame" if "frame" in found else "t", "id", "x", "y")
-    given = [found[quantity] for quantity in quantities if quantity in found]
-    others = (
-        [name or k for k, name in enumerate(source.names)] if len(given) < 4 else []
-    )
-    columns = dict[str | int, np.ndarray]()
-    for at in dict.fromkeys([*given, *others[:_LISTED]]):
-        unit = recipe.time_unit if at == found.get("t") else None
+    if source is None:
+        return ""
+    time, columns = recipe.columns.get("t"), dict[str | int, np.ndarray]()
+    given = [
+        recipe.columns[q] for q in ("t", "frame", "id", "x", "y") if q in recipe.columns
+    ]
+    names = [name or k for k, name in enumerate(source.names[:_LISTED])]
+    for at in dict.fromkeys([*given, *(names if len(given) < 4 else [])]):
+        unit = recipe.time_unit if at == time else None
         numbers = _as_floats(column_of(source, at).head(_SAMPLE), unit)
         usable = numbers[np.isfinite(numbers)]
         is_varied = 2 * len(usable) > len(numbers) and np.ptp(usable) > 0
         if at in given or (is_varied and len(columns) < _TRIED):
             columns[at] = numbers
-    shown = list(columns)
-    known = [shown.index(found[q]) if q in found else None for q in quantities]
-    values = np.array(list(columns.values()))
-    return suggest_columns(values, shown, known, recipe) if shown else ""
+    return suggest_columns(columns, recipe)
 
 
 def _as_floats(values: pl.Series, unit: str | None) -> np.ndarray:
@@ -236,7 +342,7 @@ def _as_floats(values: pl.Series, unit: str | None) -> np.ndarray:
         times = to_times(values, "UTC", unit, decimal)[0]
         if 2 * times.null_count() <= len(values):
             return times.fill_null(np.nan).to_numpy()
-    return to_ids(values, "").cast(pl.Float64).fill_null(np.nan).to_numpy()
+    return to_ids(values, Path()).cast(pl.Float64).fill_null(np.nan).to_numpy()
 
 
 # --- values -------------------------------------------------------------------------------------------
@@ -279,10 +385,9 @@ def to_times(
     if values.dtype == pl.Duration:
         return values.dt.total_nanoseconds() / 1e9, None
     if isinstance(values.dtype, pl.Datetime | pl.Date):
-        moments = values.cast(
-            pl.Datetime("ns", getattr(values.dtype, "time_zone", None))
-        )
-        if moments.dtype.time_zone is None:  # type: ignore[attr-defined]
+        zone = getattr(values.dtype, "time_zone", None)
+        moments = values.cast(pl.Datetime("ns", zone))
+        if zone is None:
             moments = moments.dt.replace_time_zone(
                 tz, ambiguous="null", non_existent="null"
             )
@@ -290,11 +395,11 @@ def to_times(
             day = moments.dt.date()
         return moments.dt.epoch("ns") / 1e9, day
     middle = numbers.drop_nans().abs().quantile(0.5) or 0.0
-    usual = next((name for least, name in _SINCE_1970.items() if middle >= least), "s")
+    usual = next(name for least, name in _SINCE_1970.items() if middle >= least)
     return numbers * TIME_UNITS[unit or usual], None
 
 
-def to_ids(values: pl.Series, where: str) -> pl.Series:
+def to_ids(values: pl.Series, where: Path) -> pl.Series:
     """The ids in a column of `values` as whole numbers; null where one is missing or no whole number.
 
     Where most are no numbers, each text gets a number, the same in every file: 53 bits of a hash, so that two
@@ -318,7 +423,7 @@ def to_ids(values: pl.Series, where: str) -> pl.Series:
         whole = values.cast(pl.Int64, strict=False).fill_null(whole)
     if values.dtype == pl.String:
         known = pl.DataFrame({"text": values, "id": whole}).drop_nulls().unique()
-        alike = known.filter(pl.col("id").is_duplicated()).sort("id", "text")["text"]
+        alike = known.filter(col.id.is_duplicated()).sort("id", "text")["text"]
         if len(alike):
             raise DataError(
                 f"{where}: the ids {alike[0]!r} and {alike[1]!r} are the same number; write them alike if "

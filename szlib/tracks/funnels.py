@@ -2,22 +2,51 @@
 
 A table has its funnel in ``DataFrame.attrs["funnel"]``, which Parquet preserves.  Each stage is a plain dict
 with the keys stage, entered, kept and rejected, so that the funnel stays with the data.
+
+Here are also the reasons: what makes a row unusable, and what people cannot do.  People walk at 1 to 2 m/s,
+are seen every few seconds at the latest, and a site is between a metre and a kilometre wide.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+import polars as pl
 from numpy.typing import ArrayLike
+from polars import col
 
-from ..core.errors import SzlibError
+from ..core.errors import DataError, SzlibError, warn
+from .recipe import Recipe, advise
+from .sources import Rows
 
 KEY = "funnel"
-WARNING = "warning: "  # how the name of a stage begins that rejects nothing, but says what is implausible
+# How the name of a stage begins that rejects nothing, but says what is implausible.
+WARNING = "warning: "
+# why a row is rejected
+MISSING, NO_ID = "missing or not a number", "id not a whole number"
+# 2100-01-01; later time stamps are not seconds since 1970
+LAST_SECOND = 4_102_444_800.0
+FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
+MOST_SHOWN = 200_000  # number of rows that are looked at
+# widest site [m]; a smaller site [m] means that metres were read as millimetres
+_SITES = (0.5, 1000.0)
+# greatest median and greatest 90 % quantile of the speed of people [m/s]
+_FASTEST = (3.0, 6.0)
+# smallest and greatest 90 % quantile of the speed where people certainly walk [m/s]
+_WALKS = (0.6, 4.0)
+# shortest and longest usual time between two samples of a person [s]
+_STEPS = (0.005, 5.0)
+_ROUGH = 1.0  # greatest roughness of ways; people who are mixed up have 1.4 and more
+_MIN_STEPS = 20  # number of steps that allows a judgement
+# greatest interquartile range of the sampling interval, over its median, of a regular clock
+_REGULAR = 0.5
+# nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
+_SPRINT, _JUMP = (12.5, 100.0)
+_WALK = 1.2  # a usual walking speed [m/s]
 
 
 def stage(
@@ -42,16 +71,12 @@ def stage(
     {'stage': 'read a.csv', 'entered': 10, 'kept': 9, 'rejected': {'not finite': 1}}
     """
     reasons = {reason: int(count) for reason, count in rejected.items() if count}
-    if int(entered) != int(kept) + sum(reasons.values()):
+    if entered != kept + sum(reasons.values()):
         raise SzlibError(
             f"funnel stage '{name}' does not add up: {entered} != {kept} + {reasons}"
         )
-    return {
-        "stage": name,
-        "entered": int(entered),
-        "kept": int(kept),
-        "rejected": reasons,
-    }
+    counts = {"entered": int(entered), "kept": int(kept)}
+    return {"stage": name, **counts, "rejected": reasons}
 
 
 def get(frame: pd.DataFrame) -> list[dict[str, Any]]:
@@ -77,11 +102,8 @@ def warnings(stages: Sequence[Mapping[str, Any]]) -> list[str]:
     >>> funnels.warnings([funnels.stage("warning: nobody walks", 9, 9, {})])
     ['nobody walks']
     """
-    return [
-        s["stage"].removeprefix(WARNING)
-        for s in stages
-        if s["stage"].startswith(WARNING)
-    ]
+    names = [s["stage"] for s in stages]
+    return [n.removeprefix(WARNING) for n in names if n.startswith(WARNING)]
 
 
 def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -119,14 +141,11 @@ def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     1  read  - not finite     1
     2  read          kept     9
     """
-    rows: list[tuple[str, str, int]] = []
+    rows = []
     for s in stages:
-        rows.append((s["stage"], "entered", s["entered"]))
-        rows += [
-            (s["stage"], f"- {reason}", count)
-            for reason, count in s["rejected"].items()
-        ]
-        rows.append((s["stage"], "kept", s["kept"]))
+        reasons = [(f"- {reason}", count) for reason, count in s["rejected"].items()]
+        counts = ("entered", s["entered"]), *reasons, ("kept", s["kept"])
+        rows += [(s["stage"], *count) for count in counts]
     return pd.DataFrame(rows, columns=["stage", "what", "rows"])
 
 
@@ -151,21 +170,171 @@ def add(funnels: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
     >>> funnels.add(days)
     [{'stage': 'read', 'entered': 15, 'kept': 14, 'rejected': {'not finite': 1}}]
     """
-    sums: dict[str, list[Mapping[str, Any]]] = {}
-    for stages in funnels:
-        for s in stages:
-            sums.setdefault(s["stage"], []).append(s)
+    rows = table([*chain.from_iterable(funnels)])
     added = []
-    for name, parts in sums.items():
-        reasons: Counter[str] = Counter()
-        for part in parts:
-            reasons.update(part["rejected"])
-        added.append(
-            stage(
-                name,
-                sum(p["entered"] for p in parts),
-                sum(p["kept"] for p in parts),
-                reasons,
-            )
-        )
+    for name, part in rows.groupby("stage", sort=False):
+        counts = part.groupby("what", sort=False)["rows"].sum().to_dict()
+        entered, kept = counts.pop("entered"), counts.pop("kept")
+        reasons = {str(what)[2:]: count for what, count in counts.items()}
+        added.append(stage(str(name), entered, kept, reasons))
     return added
+
+
+# --- rows ---------------------------------------------------------------------------------------------
+
+
+def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
+    """Why a row of a `table` as in `Rows` is rejected; null where it is usable."""
+    numbers, places = col("t", "x", "y"), col("x", "y")
+    reasons = {
+        "missing or extra fields": col.ragged,
+        MISSING: pl.any_horizontal(numbers.is_null()),
+        NO_ID: col.id.is_null(),
+        "not finite": ~pl.all_horizontal(numbers.is_finite()),
+        "time not in seconds since 1970": col.t.abs() > LAST_SECOND,
+        "position not on Earth": pl.any_horizontal(places.abs() > FARTHEST),
+    }
+    if "day" in table.collect_schema():
+        reasons["no day"] = col.day.is_null()
+    whens = [pl.when(holds).then(pl.lit(name)) for name, holds in reasons.items()]
+    return pl.coalesce(whens)
+
+
+# --- people -------------------------------------------------------------------------------------------
+
+
+class Motion(NamedTuple):
+    """How people move in a table.
+
+    Attributes
+    ----------
+    median_speed, high_speed : median and 90 % quantile of the speed of people [m/s].
+    interval : median time between two samples of a person [s].
+    irregularity : interquartile range of that time, over its median.
+    width : width of the site [m].
+    roughness : median change of the velocity from one second to the next, over the median speed.
+    """
+
+    median_speed: float
+    high_speed: float
+    interval: float
+    irregularity: float
+    width: float
+    roughness: float
+
+    @property
+    def fault(self) -> str:
+        """Why people cannot move like this; empty where they can."""
+        if self.median_speed > _FASTEST[0] or self.high_speed > _FASTEST[1]:
+            return f"people move at {self.median_speed:.3g} m/s (median), expected 0 to {_FASTEST[0]:g}"
+        if self.high_speed < _WALKS[0]:
+            quantiles = f"the median of their speed is {self.median_speed:.2g} m/s, the 90 % quantile"
+            return f"nobody walks: {quantiles} {self.high_speed:.2g} m/s"
+        return ""
+
+    @property
+    def is_walking(self) -> bool:
+        """Whether people certainly walk, and are sampled regularly."""
+        return (
+            not self.fault
+            and self.high_speed <= _WALKS[1]
+            and self.irregularity <= _REGULAR
+            and _STEPS[0] <= self.interval <= _STEPS[1]
+            and 1 <= self.width <= _SITES[1]
+            and self.roughness < _ROUGH
+        )
+
+
+def measure_motion(rows: np.ndarray) -> Motion | None:
+    """How people move in `rows` t [s], id, x, y [m], shape (4, n); None where there are too few steps."""
+    rows = rows[:, np.isfinite(rows).all(axis=0)]
+    if rows.shape[1] <= _MIN_STEPS:
+        return None
+    rows = rows[:, np.lexsort((rows[0], rows[1]))]
+    step, person, *_ = np.diff(rows)
+    same, is_later = person == 0, np.diff(np.floor(rows[0])) != 0
+    # one row a second
+    duration, person, *moved = np.diff(rows[:, np.r_[True, ~same | is_later]])
+    by_second = person == 0
+    if by_second.sum() < _MIN_STEPS:
+        return None
+    velocity = np.array(moved) / np.where(by_second, duration, np.nan)
+    change = np.hypot(*np.diff(velocity, axis=1))
+    change = change[np.isfinite(change)]
+    median, fast = np.quantile(np.hypot(*velocity)[by_second], [0.5, 0.9])
+    low, usual, high = np.quantile(step[same], [0.25, 0.5, 0.75])
+    irregularity = (high - low) / usual if usual > 0 else np.inf
+    roughness = np.median(change) / median if len(change) and median else 0.0
+    width = _spread(rows[2:])
+    return Motion(*map(float, (median, fast, usual, irregularity, width, roughness)))
+
+
+def _spread(places: np.ndarray) -> float:
+    """The wider side of the rectangle that holds nearly all `places`, shape (2, n)."""
+    return float(np.ptp(np.quantile(places, [0.01, 0.99], axis=1), axis=0).max())
+
+
+def first_rows(rows: pl.DataFrame) -> np.ndarray:
+    """The first of `rows` as t, number of the person, x, y, shape (4, n)."""
+    person = col.id.rank("dense")  # floats do not tell large ids apart
+    first = rows.head(MOST_SHOWN).select("t", person, "x", "y")
+    return first.to_numpy().astype(float).T
+
+
+def check_people(
+    rows: Rows, good: pl.DataFrame, given: Recipe, suggest: Callable[[], str]
+) -> None:
+    """Raise DataError where people cannot move as in a table, or on such a site; suggest another reading.
+
+    Where the user has given the unit, a DataWarning is enough, as where people may just all be standing.
+
+    Parameters
+    ----------
+    rows : how the file was read.
+    good : its usable rows t [s], id, x, y [m].
+    given : the recipe that the user gave.
+    suggest : gives advice how to read the file.
+    """
+    seen, is_given, recipe = first_rows(good), given.has_places, rows.recipe
+    if not recipe.shape.is_sure:
+        found, fault = measure_motion(seen), "people are seen too briefly"
+        if found is not None:
+            is_irregular = found.irregularity > _REGULAR
+            irregular = "people are seen at irregular times" if is_irregular else ""
+            fault = found.fault or irregular
+        advice = suggest() if fault else ""
+        message = "; ".join(filter(None, [f"{rows.path}: {fault}", advice]))
+        if is_given and advice:
+            warn(message)
+        elif not is_given and (advice or (found and found.high_speed > _FASTEST[1])):
+            if found and found.median_speed > _FASTEST[0]:
+                scale = advise(scale=float(f"{_WALK / found.median_speed:.2g}"))
+                message += f"; if they are pixels in which people walk at {_WALK:g} m/s, {scale}"
+            raise DataError(
+                f"{message}; if people do move like that, {advise(unit='m')}"
+            )
+    metres, reach = recipe.metres, np.abs(seen[2:]).max()
+    is_small = metres < 1 and reach < _SITES[0]
+    spread = reach if is_small else _spread(seen[2:])
+    if not is_given and (is_small or (metres == 1 and spread > _SITES[1])):
+        unit, other = ("m", "mm") if is_small else ("mm", "m")
+        raise DataError(
+            f"{rows.path}: positions span {spread:.3g} m, read as {recipe.file_format}; if they are in "
+            f"{unit}, {advise(unit=unit)}; if the site is of that size, {advise(unit=other)}"
+        )
+
+
+def find_implausible(rows: pl.DataFrame) -> list[str]:
+    """What people cannot do in `rows` day, id, t [s], x, y [m], sorted by day, id and t, as texts."""
+    rows = rows.with_columns(id=pl.struct("day", "id").rle_id())
+    motion = measure_motion(first_rows(rows))
+    texts = [motion.fault] if motion and motion.fault else []
+    person, step, x, y = (col(name).diff() for name in ("id", "t", "x", "y"))
+    moved = (x**2 + y**2).sqrt()
+    is_jump = (person == 0) & (moved > _JUMP + _SPRINT * step)
+    speeds = rows.select((moved / step).filter(is_jump)).to_numpy()
+    if len(speeds):
+        texts.append(
+            f"people jump {len(speeds):,} times, at up to {speeds.max():,.0f} m/s: positions or ids are wrong"
+        )
+    return texts

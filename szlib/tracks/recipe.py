@@ -1,42 +1,40 @@
-"""How files of tracks are read: a `Recipe`, which is found, saved, and used by every command."""
+"""How files of tracks are read: a `Recipe`, which is found, saved, and used by every command.
+
+Files of a kind that has a name have a `Shape`: how it is recognised, and the recipe that reads it. A new one
+is an entry in `shapes.toml` beside this file.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import shlex
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+import tomllib
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
 
-from ..core.checks import require
 from ..core.errors import DataError
 from ..core.files import write_file
-from ..core.input_files import read_small, reading
+from ..core.input_files import read_small, reading, require
 
 # Which column holds each quantity: its name, the number of the field from 0, or a sum of columns in SQL.
 Columns = Mapping[str, str | int]
 QUANTITIES = ("t", "frame", "id", "x", "y", "day", "speed")
-UNITS = {
-    "m": 1.0,
-    "cm": 1e-2,
-    "mm": 1e-3,
-    "km": 1e3,
-    "in": 0.0254,
-    "ft": 0.3048,
-    "yd": 0.9144,
-}
+_FOLDER = Path(__file__).parent
+# Usual names of columns and of units.
+NAMES = tomllib.loads((_FOLDER / "names.toml").read_text("utf-8"))
+UNITS = NAMES["metres"]
 """Metres in a unit of position."""
-PIXELS, DEGREES = "px", "deg"  # units that need a scale or a homography, and an origin
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "days": 86_400.0}
+TIME_UNITS = NAMES["seconds"]
 """Seconds in a unit of time; days are those of Excel."""
-SHORTEST_GAP = (
-    0.1  # a step of the common clock [s]; a track cannot end after a shorter gap
-)
+PIXELS, DEGREES = "px", "deg"  # units that need a scale or a homography, and an origin
+# A step of the common clock [s]; a track cannot end after a shorter gap.
+SHORTEST_GAP = 0.1
 FILE_NAME = "reading.json"  # a recipe beside the data
 # Environment variable of the command that reads files, such as "szlib inspect hall.csv"; unset in a program.
 COMMAND_VARIABLE = "SZLIB_COMMAND"
@@ -49,6 +47,14 @@ _BOUNDS = {
     "max_gap": (SHORTEST_GAP + 1e-9, np.inf, "longer than the clock's 0.1 s"),
     "max_rejected": (0, 1, "from 0 to 1"),
 }
+_SHAPES = tomllib.loads((_FOLDER / "shapes.toml").read_text("utf-8"))
+# What a value must be one of, and the shapes of arrays.
+_CHOICES = {
+    "file_format": _SHAPES,
+    "unit": [*UNITS, PIXELS, DEGREES],
+    "time_unit": TIME_UNITS,
+}
+_ARRAYS = {"homography": (3, 3), "origin": (2,)}
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,7 @@ class Recipe:
 
     Attributes
     ----------
-    file_format : a name in `szlib.tracks.shapes.SHAPES`; None recognises the file by its content.
+    file_format : a name in `szlib.tracks.recipe.SHAPES`; None recognises the file by its content.
     columns : the column that holds t or frame, id, x, y, and day (the recording): its name; the number of the
         field from 0 where the file has no header (f0, f1, ... in sums); or a sum of columns in SQL, such as
         "sec + 1e-9 * nanosec" or "(xmin + xmax) / 2".  Others are found by usual names.
@@ -91,7 +97,7 @@ class Recipe:
     """
 
     file_format: str | None = None
-    columns: Columns | None = None
+    columns: Columns = field(default_factory=dict)
     where: str | None = None
     frame_rate: float | None = None
     time_unit: str | None = None
@@ -108,93 +114,119 @@ class Recipe:
         for name, (low, high, expected) in _BOUNDS.items():
             value = getattr(self, name)
             require(value is None or low <= value <= high, name, value, expected)
-        units, times = [None, *UNITS, PIXELS, DEGREES], [None, *TIME_UNITS]
-        require(self.unit in units, "unit", self.unit, f"one of {units[1:]}")
-        expected = f"one of {times[1:]}"
-        require(self.time_unit in times, "time_unit", self.time_unit, expected)
-        for name, shape in (("homography", (3, 3)), ("origin", (2,))):
+        for name, known in _CHOICES.items():
+            value = getattr(self, name)
+            require(value in (None, *known), name, value, f"one of {list(known)}")
+        for name, shape in _ARRAYS.items():
             if (given := getattr(self, name)) is not None:
                 numbers = np.ravel(np.array(given, float))
                 fits = numbers.size == np.prod(shape) and np.isfinite(numbers).all()
                 require(fits, name, given, f"numbers of shape {shape}")
                 object.__setattr__(self, name, numbers.reshape(shape).tolist())
-        if self.origin is not None and self.unit is None:
-            object.__setattr__(self, "unit", DEGREES)
         if self.unit in UNITS and self.scale:
             raise DataError("both unit and scale are given; expected one of them")
-        columns = set(self.columns or ())
-        if unknown := sorted(columns - set(QUANTITIES)):
-            raise DataError(
-                f"columns: {unknown} are unknown; expected some of {list(QUANTITIES)}"
-            )
-        if columns >= {"t", "frame"}:
+        _require_known("columns", self.columns, QUANTITIES)
+        if {"t", "frame"} <= set(self.columns):
             raise DataError("columns: both t and frame are given; expected one of them")
         is_text = isinstance(self.where, str | None)
         require(is_text, "where", self.where, "a condition in SQL, as text")
         try:
-            ZoneInfo("UTC" if self.tz is None else self.tz)
+            ZoneInfo(self.tz or "UTC")
         except (KeyError, ValueError, OSError) as error:
             raise DataError(
                 f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'"
             ) from error
 
     @property
-    def metres(self) -> float | None:
-        """Metres in one unit of position; None where nothing says it."""
-        return self.scale or UNITS.get(self.unit or "")
+    def shape(self) -> Shape:
+        """The shape of files that are read so: that of the `file_format`, or "tidy"."""
+        return SHAPES[self.file_format or "tidy"]
+
+    @property
+    def metres(self) -> float:
+        """Metres in one unit of position; 1 where nothing says it."""
+        return self.scale or UNITS.get(self.unit or "m", 1.0)
 
     @property
     def has_places(self) -> bool:
         """Whether it says how positions become metres."""
-        return bool(self.metres or self.homography or self.origin)
+        return self.unit in UNITS or bool(self.scale or self.homography or self.origin)
 
     @property
     def names_people(self) -> bool:
         """Whether it names the columns of id, x and y."""
-        return {"id", "x", "y"} <= set(self.columns or ())
+        return {"id", "x", "y"} <= set(self.columns)
 
     def over(self, base: Recipe) -> Recipe:
         """This recipe, completed by values of `base` where it has none."""
         own, more = self.as_json(), base.as_json()
-        mine, others = own.get("columns", {}), more.get("columns", {})
+        mine, others = dict(self.columns), dict(base.columns)
         for given, kept, names in (
             (own, more, ("frame_rate", "time_unit")),
-            (own, more, ("unit", "scale", "homography", "origin")),
+            (own, more, ("unit", "scale", *_ARRAYS)),
             (mine, others, ("t", "frame")),
         ):
             for name in names if given.keys() & names else ():
                 kept.pop(name, None)
-        return Recipe(**more | own | {"columns": (others | mine) or None})
+        return Recipe(**more | own | {"columns": others | mine})
 
     def as_json(self) -> dict[str, Any]:
         """The values that are given, as JSON: ``Recipe(**recipe.as_json())`` is the same."""
         return {
-            name: value for name, value in asdict(self).items() if value is not None
+            k: value for k, value in asdict(self).items() if value not in (None, {})
         }
 
     def save(self, path: str | Path) -> Path:
         """Write the recipe to the file `path`, as JSON; returns its path."""
-        write_file(
-            path, json.dumps(self.as_json(), indent=1, ensure_ascii=False) + "\n"
-        )
+        content = json.dumps(self.as_json(), indent=1, ensure_ascii=False)
+        write_file(path, content + "\n")
         return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> Recipe:
         """Read a recipe from the file `path`; raises DataError where it holds something else."""
-        with reading(
-            Path(path), "as a recipe", "JSON, as `szlib inspect --save` writes it"
-        ):
-            content = dict(json.loads(read_small(Path(path))))
-        known = {each.name for each in fields(cls)}
-        if unknown := sorted(content.keys() - known):
-            raise DataError(
-                f"{path}: {unknown} are unknown; expected some of {sorted(known)}"
-            )
-        try:
+        path = Path(path)
+        with reading(path, "as a recipe", "JSON, as `szlib inspect --save` writes it"):
+            content = dict(json.loads(read_small(path)))
+            _require_known(f"{path}", content, [each.name for each in fields(cls)])
             return cls(**content)
-        except (TypeError, ValueError) as error:
-            raise DataError(f"{path}: is no recipe ({error})") from error
+
+
+def _require_known(where: str, names: Collection[str], known: Sequence[str]) -> None:
+    """Raise DataError where one of the `names` is not `known`."""
+    if unknown := sorted(set(names) - set(known)):
+        raise DataError(f"{where}: {unknown} are unknown; expected some of {known}")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A kind of files: an entry of `shapes.toml`, which explains the attributes.
+
+    Examples
+    --------
+    >>> from szlib.tracks.recipe import SHAPES
+    >>> SHAPES["ngsim"].recipe.unit
+    'ft'
+    """
+
+    name: str
+    recipe: Recipe
+    begins: str = ""
+    file: str = ""
+    header: Collection[str] = ()
+    n_fields: int = 0
+    has_header: bool | None = None
+    parse: str = ""
+    is_sequence: bool = False
+    is_streamed: bool = False
+    is_sure: bool = False
+
+
+SHAPES = {
+    name: Shape(name, Recipe(**entry.pop("recipe", {})), **entry)
+    for name, entry in _SHAPES.items()
+}
+"""Shapes by name, in the order of recognition; "tidy" is any other table."""
 
 
 def find_recipe(
@@ -202,12 +234,12 @@ def find_recipe(
 ) -> Recipe:
     """The `recipe` with `parameters` in place of its own; without one, that beside the first of `files`."""
     if recipe is None:
-        recipe, first = Recipe(), next(iter(files), None)
-        if isinstance(first, str | Path):
-            beside = Path(first).parent / FILE_NAME
-            recipe = Recipe.load(beside) if beside.is_file() else recipe
+        paths = [Path(each) for each in files[:1] if isinstance(each, str | Path)]
+        saved = [path.with_name(FILE_NAME) for path in paths]
+        found = [Recipe.load(path) for path in saved if path.is_file()]
+        recipe = found[0] if found else Recipe()
     given = {name: value for name, value in parameters.items() if value is not None}
-    return Recipe(**given).over(recipe) if given else recipe
+    return Recipe(**given).over(recipe)
 
 
 def arguments(recipe: Mapping[str, Any]) -> str:

@@ -1,40 +1,39 @@
-"""The shapes of files that have a name: how each is recognised, and the `Recipe` that reads it.
+"""Files that are no tables of text, and tables of other libraries, as columns.
 
-A new shape is one entry in `shapes.toml` beside this file.  A file that is no table also has a function here
-that makes one of it.
+A file whose shape in `shapes.toml` has a key `parse` is read by a function here, or by a loader of PedPy.
 """
 
 from __future__ import annotations
 
 import json
-import re
-import tomllib
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+import sqlite3
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import polars as pl
-from polars import selectors
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.dataset  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
+import shapely
+from polars import col, selectors
 
-from ..core.checks import check_columns, require
+from ..core.checks import check_columns
 from ..core.errors import DataError, SzlibError, warn
 from ..core.input_files import reading
-from .recipe import Recipe
-from .sources import (
-    Source,
-    find_separator,
-    open_frame,
-    open_table,
-    open_text,
-    read_text,
-    split_line,
-)
+from .recipe import SHAPES, Recipe, Shape
+from .sources import File, Source, charge, open_text
 
 # Central square of the ATC mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues).
 ATC_AREA = ((-18.5, -7.5), (-10.0, 8.0))
+# rows that are read before the size of all is checked, of a table and of a database
+_ROWS_AT_ONCE, _VALUES_AT_ONCE = 4096, 100
 # Sessions of THOR-MAGNI are nearer to each other than this share of the usual step of the clock.
 _SESSION = 0.5
 
@@ -43,175 +42,243 @@ _SESSION = 0.5
 _EWAP_RATES, _EWAP_GAP = (15.0, 25.0), 2.25
 # A rate needs so many steps of at least this length [m], and is at most this share off.
 _EWAP_STEPS, _EWAP_STEP, _EWAP_ERROR = 10, 0.02, 0.1
-_VADERE_RATE = (
-    10.0  # frames a second to which PedPy brings footsteps: those of the clock
+# Frames a second to which PedPy brings footsteps: those of the clock.
+_VADERE_RATE = 10.0
+_PEDPY_ADVICE = (
+    "if the file does not state them, pass frame_rate= and unit='m' or 'cm'; if it is another format, pass "
+    "file_format="
 )
 
 # The table of a file, and the values of a recipe that the file states.
 Parsed = tuple[pl.DataFrame | pd.DataFrame | Source, dict[str, Any]]
 
 
-@dataclass(frozen=True)
-class Shape:
-    """A kind of files: an entry of `shapes.toml`.
+def open_shape(shape: Shape, file: File) -> tuple[Source, Recipe]:
+    """The table of a `file` of a `shape`, and its recipe completed by the file."""
+    recipe, n = file.recipe, shape.n_fields
+    if not shape.parse:
+        return open_text(file, False if n else shape.has_header, n), recipe
+    reader, advice = "szlib", "fetch it again"
+    try:
+        if shape.parse in PARSERS:
+            table, stated = PARSERS[shape.parse](file)
+            recipe = recipe.over(Recipe(**stated))
+        else:
+            reader, advice = "PedPy", _PEDPY_ADVICE
+            table, stated = _load_by_pedpy(shape.parse, file)
+            recipe = Recipe(**stated).over(recipe)
+        return open_table(table, file.path), recipe
+    except SzlibError:
+        raise
+    except Exception as error:  # of any library that a reader uses
+        fault = f"{type(error).__name__}: {error}"
+        fault = " ".join(fault.replace(str(file.plain), file.path.name).split())
+        raise DataError(
+            f"{file.path}: {reader} cannot read it as {shape.name} ({fault}); {advice}"
+        ) from error
 
-    Attributes
-    ----------
-    name : of the shape.
-    recipe : how it is read; values that users give are taken before.
-    begins : regular expression for the first two lines; its named groups stand in braces in columns.
-    file : regular expression for the name of the file.
-    header : names that are in its header.
-    n_fields : number of fields of a row without header.
-    has_header : whether the first line names the columns; None looks at it.
-    parse : what makes a table of the file: a name in `PARSERS`, or of a loader of PedPy.
-    is_sequence : whether each file is a recording of its own, without a calendar.
-    is_streamed : whether files are too large to be read as a whole.
-    is_sure : whether units and columns cannot be others.
 
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.tracks.shapes import SHAPES
-    >>> SHAPES["ngsim"].recipe.unit
-    'ft'
-    """
+# --- tables -------------------------------------------------------------------------------------------
 
-    name: str
-    recipe: Recipe
-    begins: str = ""
-    file: str = ""
-    header: Collection[str] = ()
-    n_fields: int = 0
-    has_header: bool | None = None
-    parse: str = ""
-    is_sequence: bool = False
-    is_streamed: bool = False
-    is_sure: bool = False
 
-    def open(
-        self, plain: Path, path: Path, recipe: Recipe, size: int | None = None
-    ) -> tuple[Source, Recipe]:
-        """The table of the unpacked file `plain`, given as `path`, and the `recipe` completed by the file.
+def open_table(table: Any, where: Path) -> Source:
+    """A `table` of another library, called `where` in messages; see `is_table`."""
+    if isinstance(table, Source):
+        return table
+    if hasattr(table, "to_point_gdf"):  # MovingPandas
+        table = table.to_point_gdf()
+    if not isinstance(table, pd.DataFrame):
+        columns = pl.DataFrame(table)
+        return Source(where, columns.columns, columns.to_series)
+    frame = _with_points(table, where)
 
-        Of a text only `size` bytes are read.
-        """
-        where, n = f"{path}", self.n_fields
-        if not self.parse:
-            has_header = False if n else self.has_header
-            return open_text(
-                plain, where, has_header=has_header, n_fields=n, size=size
-            ), recipe
-        reader, advice = "szlib", "fetch it again"
+    def column(at: int) -> pl.Series:
+        """A column of the table; one of mixed types as text."""
+        values = frame.iloc[:, at].reset_index(drop=True)
+        is_mixed = values.dtype.kind == "O"
+        return pl.Series(values.astype("string") if is_mixed else values)
+
+    return Source(where, list(map(str, frame.columns)), column)
+
+
+def _with_points(table: pd.DataFrame, where: Path) -> pd.DataFrame:
+    """A table with x, y of its points, as in GeoPandas, and with t of its index if this holds dates."""
+    name = str(table.index.name or "t")
+    if isinstance(table.index, pd.DatetimeIndex) and name not in table.columns:
+        table = table.reset_index(names=name)
+    points = getattr(table, "geometry", None)
+    if points is None or {"x", "y"} <= set(table.columns):
+        return table
+    if getattr(getattr(table, "crs", None), "is_geographic", False):
+        advice = "project them to metres: table.to_crs(table.estimate_utm_crs())"
+        raise DataError(f"{where}: its points are in degrees; {advice}")
+    shapes = np.asarray(points, object)
+    flat = pd.DataFrame(table.drop(columns=points.name))
+    return flat.assign(x=shapely.get_x(shapes), y=shapely.get_y(shapes))
+
+
+def open_arrow(file: File) -> Source:
+    """A Parquet or Feather `file`.  By pyarrow: a damaged file can make Polars abort the process."""
+    is_parquet = file.head.startswith("PAR1")
+    kind = "Parquet" if is_parquet else "Feather"
+
+    @contextmanager
+    def explained() -> Iterator[None]:
+        """Raise what pyarrow raises as DataError."""
         try:
-            if self.parse in PARSERS:
-                table, stated = PARSERS[self.parse](plain, path, recipe)
-                recipe = recipe.over(Recipe(**stated))
-            else:
-                reader, advice = "PedPy", _PEDPY_ADVICE
-                table, stated = _load_by_pedpy(self.parse, plain, path, recipe)
-                recipe = Recipe(**stated).over(recipe)
-            if isinstance(table, Source):
-                return table, recipe
-            return open_table(table, where), recipe
-        except SzlibError:
+            yield
+        except DataError:
             raise
-        except Exception as error:  # of any library that a reader uses
-            fault = f"{type(error).__name__}: {error}".replace(str(plain), path.name)
+        except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
             raise DataError(
-                f"{path}: {reader} cannot read it as {self.name} ({' '.join(fault.split())}); {advice}"
+                f"{file.path}: damaged {kind} ({error}); fetch or write the file again"
             ) from error
 
+    with explained():
+        read = pq.read_schema if is_parquet else pa.ipc.open_file
+        schema = read(file.plain)
+        schema = getattr(schema, "schema", schema)
+        data = pa.dataset.dataset(file.plain, schema, kind.lower())
 
-def _read_shapes() -> dict[str, Shape]:
-    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    return {
-        name: Shape(name, Recipe(**entry.pop("recipe", {})), **entry)
-        for name, entry in tomllib.loads(text).items()
-    }
+    def column(k: int) -> pl.Series:
+        """A column of the file."""
+        with explained():
+            found = schema.field(k)
+            batches = data.to_batches(columns=[found.name], batch_size=_ROWS_AT_ONCE)
+            charged = _charged(batches, lambda batch: int(batch.nbytes), file.path)
+            table = pa.Table.from_batches(charged, pa.schema([found]))
+            table.validate(full=True)
+            # without metadata
+            return pl.DataFrame(pa.table({"c": table[0]})).to_series()
+
+    return Source(file.path, schema.names, column)
 
 
-SHAPES = _read_shapes()
-"""Shapes by name, in the order of recognition; "tidy" is any other table."""
+def _charged(
+    batches: Iterable[Any], measure: Callable[[Any], int], where: Path
+) -> Iterator[Any]:
+    """The batches of a column, as long as memory is allowed for all of them; `measure` gives their bytes."""
+    size = 0
+    for batch in batches:
+        size += measure(batch)
+        charge(size, where, "a column")
+        yield batch
 
 
-def require_format(recipe: Recipe) -> None:
-    """Raise DataError where the format in the `recipe` has no entry in `SHAPES`."""
-    known, given = list(SHAPES), recipe.file_format
-    require(given is None or given in SHAPES, "file_format", given, f"one of {known}")
-
-
-def recognise(head: str, path: Path, recipe: Recipe) -> Shape:
-    """The shape in the `recipe`, or else that of a file `path` whose first two lines are `head`."""
-    require_format(recipe)
-    first = head.partition("\n")[0].strip()
-    fields = split_line(first, find_separator(first))
-    named = recipe.names_people
-    fitting = (
-        shape
-        for shape in SHAPES.values()
-        if not (named and "id" in (shape.recipe.columns or {}) and not shape.parse)
-        and set(shape.header) <= set(fields)
-        and re.match(shape.begins, head, re.MULTILINE)
-        and re.match(shape.file, path.name)
+def open_json(file: File) -> Source:
+    """A JSON `file`: an object a line, a list of objects, or points of GeoJSON."""
+    content, expected = (
+        file.text(),
+        "an object a line, a list of objects, or GeoJSON of points",
     )
-    shape = SHAPES[recipe.file_format] if recipe.file_format else next(fitting)
-    found = re.match(shape.begins, head, re.MULTILINE)
-    if not (found and found.groupdict()):
-        return shape
-    sums = shape.recipe.columns or {}
-    sums = {k: str(v).format_map(found.groupdict()) for k, v in sums.items()}
-    return replace(shape, recipe=replace(shape.recipe, columns=sums))
+    with reading(file.path, "as JSON", expected):
+        if content.lstrip().startswith("["):
+            rows = json.loads(content)
+        elif '"FeatureCollection"' in content[:1000]:
+            rows = [
+                each["properties"]
+                | dict(zip("xy", each["geometry"]["coordinates"], strict=False))
+                for each in json.loads(content)["features"]
+            ]
+        else:
+            rows = [json.loads(line) for line in content.splitlines() if line.strip()]
+        names = dict.fromkeys(chain.from_iterable(rows))
+        texts = {name: _as_text(row.get(name) for row in rows) for name in names}
+    return open_table(texts, file.path)
 
 
-# --- files that are no tables -------------------------------------------------------------------------
+def _as_text(values: Iterable[Any]) -> pl.Series:
+    texts = [None if value is None else str(value) for value in values]
+    return pl.Series(texts, dtype=pl.String)
 
 
-def _parse_splines(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def open_database(file: File) -> list[Source]:
+    """The tables of a SQLite `file`; none where it is damaged.  Nothing is written, not even a journal."""
+    path = file.path
+    journal = path.with_name(f"{path.name}-wal")
+    if journal.is_file() and journal.stat().st_size:
+        raise DataError(
+            f"{path}: {journal.name} holds changes that are not in the file yet; close the program that "
+            f"writes it, or run: sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
+        )
+    address = f"{file.plain.absolute().as_uri()}?mode=ro&immutable=1"
+
+    def size_of(rows: list[Any]) -> int:
+        """Bytes of all values in some rows."""
+        return sum(map(sys.getsizeof, chain.from_iterable(rows)))
+
+    def query(text: str) -> Iterator[Any]:
+        """The rows that a query gives, as long as memory is allowed for all of them."""
+        with closing(sqlite3.connect(address, uri=True)) as database:
+            found = database.execute(text)
+            some = iter(lambda: found.fetchmany(_VALUES_AT_ONCE), [])
+            yield from chain.from_iterable(_charged(some, size_of, path))
+
+    def open_one(table: str) -> Source:
+        """One of the tables; its values as text."""
+        names = [row[1] for row in query(f'PRAGMA table_xinfo("{table}")')]
+        select = f'SELECT "{{}}" FROM "{table}"'.format
+        return Source(
+            path,
+            names,
+            lambda k: _as_text(value for (value,) in query(select(names[k]))),
+        )
+
+    try:
+        tables = query("SELECT name FROM sqlite_master WHERE type = 'table'")
+        return [open_one(name) for (name,) in tables]
+    except sqlite3.DatabaseError:
+        return []
+
+
+# --- shapes that have a parser ------------------------------------------------------------------------
+
+
+def _parse_splines(file: File) -> Parsed:
     """UCY's splines: each person's control points x, y [pixels from the middle], frame, direction."""
-    lines, rows = iter(read_text(plain, f"{path}").splitlines()), list[list[Any]]()
+    lines, rows = iter(file.text().splitlines()), list[list[Any]]()
     for person in range(1, int(next(lines).split()[0]) + 1):
         for _point in range(int(next(lines).split()[0])):
             rows.append([person, *next(lines).split()[:3]])
     return pl.DataFrame(rows, schema=["id", "x", "y", "frame"], orient="row"), {}
 
 
-def _parse_ewap(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def _parse_ewap(file: File) -> Parsed:
     """EWAP counts frames: their rate follows from the displacement in a frame, and the velocity."""
-    source, given = open_text(plain, f"{path}", has_header=False), recipe.frame_rate
+    source = open_text(file, has_header=False)
     columns = {"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
     texts = pl.DataFrame({name: source.column(k) for name, k in columns.items()})
     rows = texts.cast(pl.Float64, strict=False)
     rows = rows.filter(pl.all_horizontal(pl.all().is_finite())).sort("id", "frame")
-    x, y, vx, vy, frames = map(pl.col, ("x", "y", "vx", "vy", "frame"))
     steps = rows.select(
-        pl.col("frame", "x", "y").diff().over("id"),
-        pl.col("vx", "vy").rolling_mean(2).over("id"),
-    ).filter(frames > 0)
-    length = x**2 + y**2
+        col("frame", "x", "y").diff().over("id"),
+        col("vx", "vy").rolling_mean(2).over("id"),
+    ).filter(col.frame > 0)
+    length = col.x**2 + col.y**2
     far = steps.filter(length > _EWAP_STEP**2)
-    rates = far.select((x * vx + y * vy) * frames / length).to_series()
-    median = rates.median() if len(rates) >= _EWAP_STEPS else 0.0
-    near = [r for r in _EWAP_RATES if abs(median - r) < _EWAP_ERROR * r]  # type: ignore[operator]
-    if given is None and not near:
+    along = col.x * col.vx + col.y * col.vy
+    rates = far.select(along * col.frame / length).to_numpy()
+    median = np.median(rates) if len(rates) >= _EWAP_STEPS else 0.0
+    near = [r for r in _EWAP_RATES if abs(median - r) < _EWAP_ERROR * r]
+    found = [file.recipe.frame_rate or 0.0, *near]
+    rate = next(filter(None, found), None)
+    if rate is None:
         raise DataError(
-            f"{path}: the frame rate cannot be estimated from the file's velocities; pass frame_rate=15 "
+            f"{file.path}: the frame rate cannot be estimated from the file's velocities; pass frame_rate=15 "
             "(ETH) or 25 (hotel, zara, students), or what the video has"
         )
-    rate = given or near[0]
     if near and abs(rate - near[0]) > _EWAP_ERROR * near[0]:
         warn(
-            f"{path.name}: read at {rate:g} frames/s as given; its velocities suggest {near[0]:g}"
+            f"{file.path.name}: read at {rate:g} frames/s as given; its velocities suggest {near[0]:g}"
         )
     interval = steps["frame"].median()
     gap = _EWAP_GAP * interval / rate if isinstance(interval, float) else None
     return source, {"frame_rate": rate, "max_gap": gap}
 
 
-def _parse_trajnet(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def _parse_trajnet(file: File) -> Parsed:
     """TrajNet++: a JSON object a line; a scene states the samples a second.  Predictions are no tracks."""
-    text = read_text(plain, f"{path}")
-    lines = [json.loads(line) for line in text.splitlines() if line]
+    lines = [json.loads(line) for line in file.text().splitlines() if line]
     rates = [line["scene"].get("fps", 2.5) for line in lines if "scene" in line]
     tracks = [line["track"] for line in lines if "track" in line]
     rows = [each for each in tracks if each.get("prediction_number") is None]
@@ -221,32 +288,27 @@ def _parse_trajnet(plain: Path, path: Path, recipe: Recipe) -> Parsed:
     return table, {"frame_rate": float(step * min(rates, default=2.5))}
 
 
-def _parse_pathfinder(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def _parse_pathfinder(file: File) -> Parsed:
     """JSON of Pathfinder: an object of people, each an object of times.
 
     PedPy reads it as well, but rounds the number of frames a second: 2.5 becomes 2, and people slow.
     """
     rows = [
-        (t, person, at["position"]["x"], at["position"]["y"])
-        for person, times in json.loads(read_text(plain, f"{path}")).items()
+        {"t": t, "id": person} | at["position"]
+        for person, times in json.loads(file.text()).items()
         for t, at in times.items()
     ]
-    return pl.DataFrame(rows, schema=["t", "id", "x", "y"], orient="row"), {}
+    return pd.DataFrame(rows), {}
 
 
-def _parse_magni(plain: Path, path: Path, recipe: Recipe) -> Parsed:
-    """THOR-MAGNI: a helmet is worn by different people one after the other."""
-    return read_magni_rows(plain, path), {}
+def read_magni_rows(path: Path, plain: Path | None = None) -> pd.DataFrame:
+    """Rows of THOR-MAGNI as t, x, y, session, label, id, from the file `path`, unpacked at `plain`.
 
-
-def read_magni_rows(plain: Path, path: Path) -> pd.DataFrame:
-    """Rows of THOR-MAGNI as t, x, y, session, label, id, from file `plain`, given as `path`.
-
-    id = 100 * session + helmet, both from 1.  Raises DataError where a column is missing, or a helmet has no
-    number.
+    A helmet is worn by different people one after the other: id = 100 * session + helmet, both from 1.
+    Raises DataError where a column is missing, or a helmet has no number.
     """
     with reading(path, "as CSV", "a file of THOR-MAGNI"):
-        rows = pd.read_csv(plain)
+        rows = pd.read_csv(plain or path)
     check_columns(rows, list(SHAPES["magni"].header))
     times = np.unique(rows["Time"])
     step = np.diff(times)
@@ -263,55 +325,53 @@ def read_magni_rows(plain: Path, path: Path) -> pd.DataFrame:
     return people.assign(session=session)[["t", "session", "x", "y", "label", "id"]]
 
 
-def _parse_wide(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def _parse_wide(file: File) -> Parsed:
     """A table with columns x1, y1, x2, y2, ...: two for each person; a blank is nobody."""
-    source = open_text(plain, f"{path}")
+    source = open_text(file)
     table = pl.DataFrame({n: source.column(k) for k, n in enumerate(source.names)})
     places = selectors.matches(r"(?i)^[xy]_?\d+$")
-    name = pl.col("variable")
     long = table.with_row_index("row").unpivot(places, index=~places)
-    long = long.filter(pl.col("value") != "").with_columns(
-        id=name.str.extract(r"(\d+)$"), variable=name.str.head(1).str.to_lowercase()
+    long = long.filter(col.value != "").with_columns(
+        id=col.variable.str.extract(r"(\d+)$"),
+        variable=col.variable.str.head(1).str.to_lowercase(),
     )
     rows = long.pivot("variable", index=selectors.exclude("variable", "value"))
-    return replace(open_frame(rows, f"{path}"), decimal=source.decimal), {}
+    return replace(open_table(rows, file.path), decimal=source.decimal), {}
 
 
-def _parse_level_x(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def _parse_level_x(file: File) -> Parsed:
     """The inD family: whom a track belongs to, and the frame rate, are in files beside it."""
-    table, stated = pl.read_csv(plain, infer_schema=False), dict[str, Any]()
-    if "_tracks." not in path.name:
-        return table, {}
-    beside = (
-        path.with_name(path.name.replace("_tracks.", f"_{name}."))
-        for name in ("tracksMeta", "recordingMeta")
+    table, stated = pl.read_csv(file.plain, infer_schema=False), dict[str, Any]()
+    name = file.path.name
+    recording, kinds = (
+        file.path.with_name(name.replace("_tracks.", f"_{other}."))
+        for other in ("recordingMeta", "tracksMeta")
     )
-    kinds, recording = beside
-    if recording.is_file():
+    if recording.is_file() and recording != file.path:
         rates = pl.read_csv(recording, infer_schema=False)["frameRate"]
         stated["frame_rate"] = float(rates[0])
-    if kinds.is_file():
+    if kinds.is_file() and kinds != file.path:
         people = pl.read_csv(kinds, infer_schema=False).select("trackId", "class")
         table = table.join(people, "trackId", "left", maintain_order="left")
         stated["where"] = "class = 'pedestrian'"
     return table, stated
 
 
-def _parse_nuscenes(plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def _parse_nuscenes(file: File) -> Parsed:
     """nuScenes: annotations; times, scenes and kinds are in files beside them."""
 
     def load(name: str) -> dict[str, Any]:
         """The objects of a file, by token."""
-        file = path.with_name(name)
-        expected = f"the {name} of the same version, beside {path.name}"
-        with reading(file, "as nuScenes", expected):
-            return {each["token"]: each for each in json.loads(read_text(file, name))}
+        beside = replace(file, plain=file.path.with_name(name), path=Path(name))
+        expected = f"the {name} of the same version, beside {file.path.name}"
+        with reading(beside.plain, "as nuScenes", expected):
+            return {each["token"]: each for each in json.loads(beside.text())}
 
     samples, instances, kinds = map(
         load, ("sample.json", "instance.json", "category.json")
     )
     rows = []
-    for each in json.loads(read_text(plain, f"{path}")):
+    for each in json.loads(file.text()):
         sample, person = samples[each["sample_token"]], each["instance_token"]
         kind = kinds[instances[person]["category_token"]]["name"]
         if kind.startswith("human"):
@@ -320,19 +380,17 @@ def _parse_nuscenes(plain: Path, path: Path, recipe: Recipe) -> Parsed:
     return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), {}
 
 
-PARSERS: dict[str, Callable[[Path, Path, Recipe], Parsed]] = {
-    "splines": _parse_splines, "ewap": _parse_ewap, "trajnet": _parse_trajnet, "magni": _parse_magni,
+PARSERS: dict[str, Callable[[File], Parsed]] = {
+    "splines": _parse_splines, "ewap": _parse_ewap, "trajnet": _parse_trajnet,
+    "magni": lambda file: (read_magni_rows(file.path, file.plain), {}),
     "pathfinder": _parse_pathfinder, "wide": _parse_wide, "level_x": _parse_level_x,
     "nuscenes": _parse_nuscenes,
 }  # fmt: skip
-_PEDPY_ADVICE = (
-    "if the file does not state them, pass frame_rate= and unit='m' or 'cm'; if it is another format, pass "
-    "file_format="
-)
 
 
-def _load_by_pedpy(loader: str, plain: Path, path: Path, recipe: Recipe) -> Parsed:
+def _load_by_pedpy(loader: str, file: File) -> Parsed:
     """The rows that function `loader` of PedPy gives, and frames a second."""
+    path, recipe = file.path, file.recipe
     try:
         import pedpy
     except ImportError as error:
@@ -355,7 +413,7 @@ def _load_by_pedpy(loader: str, plain: Path, path: Path, recipe: Recipe) -> Pars
     elif loader == "vadere":
         given = {"frame_rate": _VADERE_RATE}
     load = getattr(pedpy, f"load_trajectory_from_{loader}")
-    loaded = load(trajectory_file=plain, **given)
+    loaded = load(trajectory_file=file.plain, **given)
     if not (rate := float(loaded.frame_rate)) > 0:
         raise ValueError(f"it states {rate:g} frames/s; expected a positive number")
     rows = pd.DataFrame(loaded.data)[["frame", "id", "x", "y"]]

@@ -30,9 +30,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..core import memory
 from ..core.errors import DataError, DataWarning, SzlibError
-from ..core.input_files import printable
+from ..core.input_files import granted_memory, parse_size, printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,9 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with _stop_on_signals(), warnings.catch_warnings():
             options = build_parser().parse_args(arguments)
-            size = None if options.memory is None else memory.parse_size(options.memory)
+            size = None if options.memory is None else parse_size(options.memory)
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
-            with memory.granted(size):
+            with granted_memory(size):
                 code = int(options.command(options))
             sys.stdout.flush()
         return code

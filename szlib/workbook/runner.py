@@ -25,10 +25,9 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from .. import __version__
-from ..core import memory
 from ..core.errors import DataError
 from ..core.files import folder_lock, temporary_folder, write_file
-from ..core.input_files import read_json_object
+from ..core.input_files import MEMORY_VARIABLE, memory_limit, read_json_object
 from ..core.parallel import limit_jobs, safe_path
 from ..tracks import datasets, funnels
 from . import folders
@@ -182,7 +181,7 @@ def _execute_all(
     environment = {
         folders.RUN_VARIABLE: str(home),
         folders.FIGURES_VARIABLE: figures or "",
-        memory.VARIABLE: str(memory.limit() // jobs),
+        MEMORY_VARIABLE: str(memory_limit() // jobs),
         "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", threads),
     }
     # at least one thread besides this one, with which signals stay

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib.core import files, input_files, memory
+from szlib.core import files, input_files
 from szlib.core.errors import MemoryLimitError, StorageError
 from szlib.simulation.log import SimulationLog
 
@@ -258,7 +258,7 @@ def test_file_names_that_are_not_text_are_escaped() -> None:
     [("4GB", 4e9), ("1 KiB", 1024), ("2g", 2e9), ("1.5mb", 1.5e6), ("300", 300)],
 )
 def test_amounts_of_memory(text: str, size: float) -> None:
-    assert memory.parse_size(text) == size
+    assert input_files.parse_size(text) == size
 
 
 @pytest.mark.parametrize(
@@ -266,21 +266,21 @@ def test_amounts_of_memory(text: str, size: float) -> None:
 )
 def test_text_that_is_not_an_amount_of_memory_is_refused(text: str) -> None:
     with pytest.raises(MemoryLimitError, match="expected an amount such as 4GB"):
-        memory.parse_size(text)
+        input_files.parse_size(text)
 
 
 def test_memory_limit_is_the_amount_granted_or_the_environments(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.delenv(memory.VARIABLE, raising=False)
-    assert 1e7 < memory.limit() < 1e15
-    monkeypatch.setenv(memory.VARIABLE, "2GB")
-    assert memory.limit() == 2e9
-    with memory.granted(1000):
-        assert memory.limit() == 1000
+    monkeypatch.delenv(input_files.MEMORY_VARIABLE, raising=False)
+    assert 1e7 < input_files.memory_limit() < 1e15
+    monkeypatch.setenv(input_files.MEMORY_VARIABLE, "2GB")
+    assert input_files.memory_limit() == 2e9
+    with input_files.granted_memory(1000):
+        assert input_files.memory_limit() == 1000
         with pytest.raises(
             MemoryLimitError,
             match=r"it takes about 5\.0 GB of memory, and the limit is 0",
         ):
-            memory.require(5e9, "it")
-    assert memory.limit() == 2e9
+            input_files.require_memory(5e9, "it")
+    assert input_files.memory_limit() == 2e9

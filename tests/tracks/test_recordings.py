@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import szlib
-from szlib.core import memory
 from szlib.core.errors import MemoryLimitError, StorageError
+from szlib.core.input_files import granted_memory
 from szlib.tracks import datasets
 from szlib.tracks.readers import read_raw
 from szlib.tracks.sources import unpack
@@ -153,19 +153,19 @@ def test_files_too_large_for_memory_are_refused_before_reading(tmp_path: Path) -
     for name in ("a.csv.gz", "a.csv"):
         (tmp_path / "a.csv.gz").write_bytes(gzip.compress(file.read_bytes()))
         with (
-            memory.granted(10_000),
+            granted_memory(10_000),
             pytest.raises(MemoryLimitError, match="of text takes about"),
         ):
             read_raw(tmp_path / name)
     recording(0.0).to_parquet(tmp_path / "a.parquet")
     with (
-        memory.granted(10_000),
+        granted_memory(10_000),
         pytest.raises(MemoryLimitError, match="of a column takes about"),
     ):
         read_raw(tmp_path / "a.parquet")
     raw = read_raw(file)
     with (
-        memory.granted(10_000),
+        granted_memory(10_000),
         pytest.raises(MemoryLimitError, match=r"the clock: 1,180 ticks of 240 rows"),
     ):
         szlib.tracks.clock.to_clock(raw)
