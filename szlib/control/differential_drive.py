@@ -61,7 +61,7 @@ from .people import STANDING_SPEED, SpeedZone, Tracker
 from .problem import build_horizon
 from .settings import MPCSettings
 from .step import Scene, Step
-from .verification import PIECES, Report, Sampled, verify_step
+from .verification import PIECES, Sampled
 from .ways import Heading, Point
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
@@ -187,12 +187,8 @@ class DriveStep(Step):
         bows = np.full((2, 1), abs(self.control.prod()) * dt**2 / 8)
         return Path(self.predicted[:2, :2], np.array([0.0, dt]), *bows)
 
-    def verify(self) -> Report:
-        """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
-        return verify_step(self, self._carry)
-
-    def _carry(self, way: Sampled) -> tuple[Array, Array]:
-        """The way of the disc, whose wheels follow the point: arcs, of complex numbers."""
+    def carry(self, way: Sampled) -> Sampled:
+        """The `way` of the disc, whose wheels follow the point: arcs, of complex numbers."""
         points, lasts = way.points[::PIECES], np.diff(way.times[::PIECES])
         _, commands = self.wheels.follow(self.own, points[1:], lasts.tolist())
         commands[0] = self.control
@@ -202,7 +198,7 @@ class DriveStep(Step):
             shares = np.expm1(turned * np.arange(1, PIECES + 1) / PIECES) / turned
             at = np.append(at, at[-1] + v * dt * np.exp(1j * theta) * shares)
             theta += omega * dt
-        return np.column_stack([at.real, at.imag]), way.times
+        return way._replace(points=np.column_stack([at.real, at.imag]))
 
 
 class DifferentialDrive(MPCCBF):

@@ -36,7 +36,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from math import dist, hypot, inf
-from operator import attrgetter
 from threading import get_ident
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -84,25 +83,25 @@ _FEW = 24  # up to this number all obstacles are in the problem, of more those t
 _BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
 
 
-class Outlook(NamedTuple):
-    """What follows a control, if people keep their velocity.
+class Bound(NamedTuple):
+    """How near the robot comes to obstacles.
 
     Attributes
     ----------
-    wall, body : lower bounds of the gaps to everything fixed, and to bodies while the robot moves [m].
-    wall_seen, body_seen : the least of these gaps at points of the way [m].
+    lower : lower bound of the gaps on the way [m].
+    seen : the least of these gaps at points of the way [m].
     """
 
-    wall: float = inf
-    body: float = inf
-    wall_seen: float = inf
-    body_seen: float = inf
+    lower: float = inf
+    seen: float = inf
 
     @property
-    def is_safe(self) -> tuple[bool, bool]:
-        """Whether it touches nothing fixed, and whether it overlaps nobody besides."""
-        walls_safe = self.wall >= -TOLERANCE
-        return walls_safe, walls_safe and self.body >= -TOLERANCE
+    def is_safe(self) -> bool:
+        """Whether the robot touches none of them."""
+        return bool(self.lower >= -TOLERANCE)
+
+
+_FAR = Bound()
 
 
 class MPCCBF(Controller):
@@ -311,21 +310,21 @@ class MPCCBF(Controller):
         if age:
             at = self._clock.bring_forward(self.robot, np.array(x), age, np.zeros(2))
             x = at.tolist()
-        return list(x), goal
+        return x, goal
 
     def _choose(
         self, scene: Scene, heading: Heading
     ) -> tuple[Status, Plan, tuple[bool, bool]]:
         """The plan, or full braking, and what the guard says of it."""
         status, plan = self._decide(scene, heading)
-        outlook, brakes = self._guard(scene, plan)
+        brakes, is_safe = self._guard(scene, plan)
         if brakes:
             inputs = plan_braking(self._s, scene.state[2:])
             status, plan = "braking", plan._replace(inputs=inputs)
         if self._clock.has_begun:
             self._change = plan.inputs - self._plan
         self._plan = plan.inputs
-        return status, plan, outlook.is_safe
+        return status, plan, is_safe
 
     def _finish(self, **found: Any) -> Any:
         """What the robot does, by what was `found`."""
@@ -353,7 +352,8 @@ class MPCCBF(Controller):
             along = plan_along(s, scene.state, points)
             other = self._planner.plan(question, along)
             is_late = other.timed_out
-            plan = min(plan, other, key=attrgetter("rank"))._replace(timed_out=is_late)
+            plan = min(plan, other, key=lambda each: each.rank)
+            plan = plan._replace(timed_out=is_late)
         if plan.violations == (inf,):
             return "braking", plan._replace(inputs=plan_braking(s, scene.state[2:]))
         if not plan.is_relaxed:
@@ -366,27 +366,36 @@ class MPCCBF(Controller):
                 return "restarted", other
         return "relaxed", plan
 
-    def _guard(self, scene: Scene, plan: Plan) -> tuple[Outlook, bool]:
-        """What follows the control, or full braking if the robot is to brake: see this module."""
-        s, state, control = self._s, scene.state, plan.inputs[0]
-        if self._is_clear(scene, control):
-            return Outlook(), False
-        bodies = find_bodies(scene.zones, self.settings)
-        after = self._foresee(bodies, find_stopping_path(state, control, s))
-        if after.body < -TOLERANCE:
-            later = self._foresee(bodies, self._follow_plan(scene, plan.inputs))
-            after = after._replace(body=max(after.body, later.body))
-        walls_safe, is_safe = after.is_safe
-        if is_safe or not s.guard:
-            return after, False
-        braking = plan_braking(s, state[2:])[0]
-        rest = self._foresee(bodies, find_stopping_path(state, braking, s))
-        seen = attrgetter("body_seen" if walls_safe else "wall_seen")
-        brakes = bool(seen(rest) >= min(-TOLERANCE, seen(after)))
-        return (rest if brakes else after), brakes
+    def _guard(self, scene: Scene, plan: Plan) -> tuple[bool, tuple[bool, bool]]:
+        """True if the robot is to brake (see this module), and what holds for what it does then.
 
-    def _is_clear(self, scene: Scene, control: Array) -> bool:
-        """True if the robot can touch nothing before it rests.
+        That is whether it touches nothing fixed, and whether it overlaps no body besides.
+        """
+        s, state, control = self._s, scene.state, plan.inputs[0]
+        is_wall_far, is_body_far = self._find_far(scene, control)
+        if is_wall_far and is_body_far:
+            return False, (True, True)
+        bodies = find_bodies(scene.zones, self.settings)
+        path = self._carry(find_stopping_path(state, control, s))
+        wall = _FAR if is_wall_far else self._bound_walls(path)
+        body = _FAR if is_body_far else self._bound_bodies(bodies, path)
+        walls_safe, is_safe = wall.is_safe, body.is_safe
+        if not is_safe:
+            followed = self._carry(self._follow_plan(scene, plan.inputs))
+            is_safe = self._bound_bodies(bodies, followed).is_safe
+        if (walls_safe and is_safe) or not s.guard:
+            return False, (walls_safe, walls_safe and is_safe)
+        braking = plan_braking(s, state[2:])[0]
+        path = self._carry(find_stopping_path(state, braking, s))
+        rest = self._bound_walls(path), self._bound_bodies(bodies, path)
+        before, after = (body, rest[1]) if walls_safe else (wall, rest[0])
+        if after.seen < min(-TOLERANCE, before.seen):
+            return False, (walls_safe, False)
+        walls_safe, is_safe = rest[0].is_safe, rest[1].is_safe
+        return True, (walls_safe, walls_safe and is_safe)
+
+    def _find_far(self, scene: Scene, control: Array) -> tuple[bool, bool]:
+        """Whether the robot can touch nothing fixed before it rests, and whether it can touch no body.
 
         Within a step of `control` and the braking after it, it goes no farther than `reach`.
         """
@@ -395,16 +404,17 @@ class MPCCBF(Controller):
         stop, last = max(abs(last_vx), abs(last_vy)) / s.a_max, hypot(last_vx, last_vy)
         reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
         reach += s.r_robot - self.settings.r_robot
-        contact = BODY_RADIUS + self.settings.r_robot + reach
+        contact, is_body_far = BODY_RADIUS + self.settings.r_robot + reach, True
         for person in scene.people:
             (px, py), (wx, wy) = person.position, person.velocity
             if hypot(px - x, py - y) < contact + (stop + 2 * s.dt) * hypot(wx, wy):
-                return False
+                is_body_far = False
+                break
         at, room = self._room
         if room - dist(at, (x, y)) < reach:
             room = float(self._walls_near.gaps(x, y).min(initial=inf))
             self._room = at, room = (x, y), room
-        return bool(room - dist(at, (x, y)) >= reach)
+        return room - dist(at, (x, y)) >= reach, is_body_far
 
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
@@ -420,22 +430,24 @@ class MPCCBF(Controller):
         """The way of the disc, if the point that is planned for goes along a `path`."""
         return path
 
-    def _foresee(self, bodies: Obstacles, path: Path) -> Outlook:
-        """What follows if the disc goes along a `path`, on which it comes to rest."""
-        path = self._carry(path)
+    def _bound_walls(self, path: Path) -> Bound:
+        """How near the disc comes to everything fixed on a `path` on which it comes to rest."""
+        lower, seen = self._walls_near.bound(path, are_fixed=True)
+        return Bound(lower.min(initial=inf), seen.min(initial=inf))
+
+    def _bound_bodies(self, bodies: Obstacles, path: Path) -> Bound:
+        """How near the disc comes to `bodies`, or towards those that it overlaps, while it moves."""
         begin = path.points[0]
-        wall, wall_seen = self._walls_near.bound(path, are_fixed=True)
-        of_bodies: Any = bodies.bound(path)
         if np.hypot(*np.ptp(path.points, axis=0)) <= AT_REST * self._s.dt:
-            of_bodies = np.zeros((2, 0)), np.zeros(0)
-        elif bodies.size:
+            return _FAR
+        lower, seen = bodies.bound(path)
+        overlaps = bodies.gaps(*begin) < -TOLERANCE
+        if overlaps.any():
             places = bodies.groups[0].numbers[:, :2]
             towards = ((places - begin) @ (path.points - begin).T).max(axis=1)
-            overlaps = bodies.gaps(*begin) < -TOLERANCE
             parting = np.where(towards > 0, -towards, inf)
-            of_bodies = [np.where(overlaps, parting, each) for each in of_bodies]
-        found = wall, of_bodies[0], wall_seen, of_bodies[1]
-        return Outlook(*(float(each.min(initial=inf)) for each in found))
+            lower, seen = (np.where(overlaps, parting, each) for each in (lower, seen))
+        return Bound(lower.min(initial=inf), seen.min(initial=inf))
 
     def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
         """Take what can matter among everything fixed. Looked for once a metre: see `Obstacles.find_near`."""
@@ -463,42 +475,44 @@ class MPCCBF(Controller):
         s, fixed = self.settings, self._fixed_of_disc
         if is_point:
             s, fixed = self._s, self._fixed
-        people, zones = tracked.people, Obstacles((), s.r_robot)
+        people, groups = tracked.people, list[Group]()
         found = tuple([self.zone_of(each) for each in people])
         if people:
-            placed = [
-                Zone.place(zone, each.position, each.heading or 0.0, each.velocity)
-                for zone, each in zip(found, people, strict=True)
-            ]
-            numbers = np.array(placed)
-            if any(each.prediction for each in people):
+            placed = list[float]()
+            for zone, each in zip(found, people, strict=True):
+                heading = each.heading or 0.0
+                placed += Zone.place(zone, each.position, heading, each.velocity)
+            numbers = np.array(placed).reshape(len(people), -1)
+            if [each for each in people if each.prediction]:
                 knots = [list_knots(each, s) for each in people]
                 numbers = np.hstack([numbers, knots])
-            offsets = np.full(len(people), s.r_robot + s.eps)
-            zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
+            offsets = np.array(len(people) * [s.r_robot + s.eps])
+            groups.append(Group(Zone, numbers, offsets))
+        zones = Obstacles(tuple(groups), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 
     def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
         """Where the plan heads; among unknown people, where full braking ends."""
         s, (x, y, vx, vy), goal = self._s, scene.state, scene.goal
-        at, found = (x, y), None
+        at, heading = (x, y), None
         if route is not None:
             corners = check_array("route", route, (..., 2))
             is_line, expected = corners.ndim < 3, "corners, shape (m, 2)"
             require(is_line, "route", corners.shape, expected, SolverError)
-            found = self._ways.follow(at, goal, corners)
-        if not found and (route is not None or s.lookahead < inf):
+            heading = self._ways.follow(at, goal, corners)
+        if not heading and (route is not None or s.lookahead < inf):
             groups = [person.group for person in scene.people]
-            found = self._ways.find(at, goal, scene.zones, groups)
-        heading = found or Heading(goal, dist(at, goal))
+            heading = self._ways.find(at, goal, scene.zones, groups)
+        target = heading.target if heading else goal
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max
-            return heading._replace(target=(x + vx * time / 2, y + vy * time / 2))
-        if scene.people and not heading.ways:
+            target = x + vx * time / 2, y + vy * time / 2
+        elif scene.people and not (heading and heading.ways):
             zones, fixed = scene.zones.groups[0].numbers.tolist(), self._near_fixed
-            target = find_target(at, heading.target, zones, fixed, s)
-            heading = heading._replace(target=target)
-        return heading
+            target = find_target(at, target, zones, fixed, s)
+        if heading:
+            return heading._replace(target=target)
+        return Heading(target, dist(at, goal))
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.

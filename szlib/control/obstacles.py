@@ -35,10 +35,15 @@ SHORTEST_WALL = 1e-3
 KNOT = 4  # numbers of each interval of a prediction
 
 
+def _measure_line(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
+    """Length of the segment (`xa`, `ya`) to (`xb`, `yb`), and g of (`x`, `y`) [m] (paper, eq. 3)."""
+    length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+    return length, ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+
+
 def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
     """Approximate distance of (`x`, `y`) to the segment (`xa`, `ya`) to (`xb`, `yb`) [m] (paper, eq. 3-5)."""
-    length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
-    g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+    length, g = _measure_line(x, y, xa, ya, xb, yb)
     t = (
         (length / 2) ** 2 - (x - (xa + xb) / 2) ** 2 - (y - (ya + yb) / 2) ** 2
     ) / length
@@ -49,8 +54,7 @@ def euclidean_segment_formula(
     x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any
 ) -> Any:
     """Euclidean distance of (`x`, `y`) to the segment from (`xa`, `ya`) to (`xb`, `yb`) [m]."""
-    length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
-    g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+    length, g = _measure_line(x, y, xa, ya, xb, yb)
     along = ((x - (xa + xb) / 2) * (xb - xa) + (y - (ya + yb) / 2) * (yb - ya)) / length
     beyond = abs(along) - length / 2
     return (g**2 + ((abs(beyond) + beyond) / 2) ** 2) ** 0.5
@@ -481,12 +485,8 @@ class Path(NamedTuple):
 
     def joined(self, later: Path) -> Path:
         """This path, and then a `later` one, which begins where and when this one ends."""
-        return Path(
-            np.concatenate([self.points, later.points[1:]]),
-            np.concatenate([self.times, later.times[1:]]),
-            np.concatenate([self.bows, later.bows]),
-            np.concatenate([self.asides, later.asides]),
-        )
+        rest = later.points[1:], later.times[1:], later.bows, later.asides
+        return Path._make(map(np.concatenate, zip(self, rest, strict=True)))
 
 
 class Group(NamedTuple):
@@ -587,11 +587,12 @@ class Obstacles(NamedTuple):
         """
         if not self.groups:
             return np.zeros(0), np.zeros(0)
-        start, end = path.points[:-1], path.points[1:]
-        way, lasts = end - start, np.diff(path.times)
-        at_points = self._measure(path.points, path.times, is_barrier)
+        measure: Any = self.h if is_barrier else self.gaps
+        start = path.points[:-1]
+        way, lasts = np.diff(path.points, axis=0), np.diff(path.times)
+        at_points = measure(*path.points.T, path.times)
         first, last = at_points[:, :-1], at_points[:, 1:]
-        seen = at_points[:, 1:].min(axis=1, initial=np.inf)
+        seen = last.min(axis=1, initial=np.inf)
         bows = path.asides if are_fixed else path.bows
         speeds = np.concatenate(
             [kind.speeds(numbers) for kind, numbers, _ in self.groups]
@@ -601,10 +602,9 @@ class Obstacles(NamedTuple):
         lower = (first + last - reach) / 2 - bows
         if lower.min(initial=np.inf) >= 0:
             return lower.min(axis=1, initial=np.inf), seen
-        begin, shares = path.times[:-1], (_INSTANT, 1 - _INSTANT)
         after, before = (
-            self._measure(start + share * way, begin + share * lasts, is_barrier)
-            for share in shares
+            measure(*(start + share * way).T, path.times[:-1] + share * lasts)
+            for share in (_INSTANT, 1 - _INSTANT)
         )
         falls, rises = (after - first) / _INSTANT, (last - before) / _INSTANT
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -613,10 +613,6 @@ class Obstacles(NamedTuple):
         is_dip = (falls < 0) & (rises > 0)
         lower = np.where(is_dip, np.minimum(crossing, ends) - _INSTANT * reach, ends)
         return (lower - bows).min(axis=1, initial=np.inf), seen
-
-    def _measure(self, points: Array, times: Array, is_barrier: bool) -> Array:
-        measure = self.h if is_barrier else self.gaps
-        return measure(points[:, 0], points[:, 1], times)
 
     def find_near(self, x: float, y: float, reach: float) -> list[int]:
         """Places of the obstacles whose way s may be at most `reach` from (`x`, `y`) [m].
@@ -639,7 +635,7 @@ class Obstacles(NamedTuple):
         self, formula: str, x: Any, y: Any, t: Any, *, is_barrier: bool = False
     ) -> Array:
         """The `formula` of each obstacle, shape (n, ...); of a barrier less its offset."""
-        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(t))
+        shape = np.shape(x + y + t)
         found, axes = np.empty((self.size, *shape)), (...,) + (None,) * len(shape)
         begin = 0
         for kind, numbers, offsets in self.groups:

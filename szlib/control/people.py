@@ -375,12 +375,16 @@ class Tracker:
         ------
         SolverError : an argument has the wrong type or shape: an error of the program, not of a sensor.
         """
-        now, rows = check_time(now), _split_rows(people)
+        now = check_time(now)
         self._set_clock(now)
-        known = [row[0] for row in rows if row[0] and row[0].id is None]
         is_plain = ids is None and stamps is None and not self._last_seen
-        if is_plain and len(known) == len(rows):
-            return TrackedPeople(tuple(known))
+        if is_plain and isinstance(people, list | tuple):
+            known = tuple(
+                [one for one in people if type(one) is Person and one.id is None]
+            )
+            if len(known) == len(people):
+                return TrackedPeople(known)
+        rows = _split_rows(people)
         names, given = _check_names(ids, rows)
         times = _as_floats("stamps", now if stamps is None else stamps)
         expected = f"one time, or one for each of {len(rows)} people"
@@ -394,8 +398,8 @@ class Tracker:
         for row, name, time in zip(rows, names, each_time, strict=True):
             if given[name] > 1 or name != name:  # NaN
                 name = None
-            last = None if name is None else self._recall(row, name, time, now, given)
-            seen, is_usable = self._update(row, name, time, now, last)
+            last = None if name is None else self._recall(row, name, time, given)
+            seen, is_usable = self._update(row, name, time, last)
             if seen and name is not None and (is_usable or last):
                 self._last_seen[name] = seen
             person = _move_forward(*seen, now) if seen else None
@@ -420,16 +424,11 @@ class Tracker:
         self._now = now
 
     def _recall(
-        self,
-        row: _Row,
-        name: Hashable,
-        time: float,
-        now: float,
-        given: Counter[Hashable],
+        self, row: _Row, name: Hashable, time: float, given: Counter[Hashable]
     ) -> _LastSeen | None:
         """What is known of the person of a measurement: by their id, or by their place if the id is new."""
         last = self._last_seen.get(name)
-        if not time <= now + self.memory:
+        if not time <= self._now + self.memory:
             return last
         if last is None:
             lost = {
@@ -447,15 +446,10 @@ class Tracker:
         return last
 
     def _update(
-        self,
-        row: _Row,
-        name: Hashable,
-        time: float,
-        now: float,
-        last: _LastSeen | None,
+        self, row: _Row, name: Hashable, time: float, last: _LastSeen | None
     ) -> tuple[_LastSeen | None, bool]:
         """The last known state of a person, if any, and True if all numbers of the measurement are usable."""
-        person, x, y, vx, vy = row
+        (person, x, y, vx, vy), now = row, self._now
         if person and name is None and time == now:
             return (person, now), True
         if not _are_usable(x, y):

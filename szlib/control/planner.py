@@ -36,7 +36,7 @@ within the iteration are left out.
 
 from __future__ import annotations
 
-from math import inf
+from math import hypot, inf
 from time import perf_counter, thread_time
 from typing import Any, NamedTuple
 
@@ -56,9 +56,7 @@ HARD_PRICE = 1e5
 # Rows with a larger value are left out of an iteration [m]; smaller where the plan cannot change so much.
 NEAR = 1.0
 _FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
-# Largest multiplier of the speed limit. Rows that contradict each other give huge ones, which would spoil
-# the next steps.
-_MOST_CURVED = 1e3
+_EVERY = slice(None)
 _MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 # DAQP's answers; the second one if it violates rows with a price
@@ -73,7 +71,8 @@ class Plan(NamedTuple):
     Attributes
     ----------
     inputs : accelerations, shape (N, 2) [m/s2].
-    cost : with the prices of what is violated, before the last change if it converged.
+    cost : with the prices of what is violated, before the last change if it converged; 0 of a plan that is
+        compared with no other.
     violations : if rows without a price contradict each other, the sums of the violations of walls, bodies
         and zones [m]; else empty.
     is_relaxed : True if rows without a price contradict each other.
@@ -167,7 +166,7 @@ class Program(LinearProblem):
 
         None if nothing satisfies the rows that are always there.
         """
-        rows: Any = slice(None)
+        rows: Any = _EVERY
         if len(self.levels) > _FEW_ROWS:
             rows = np.flatnonzero(self.lower > self.near)
         found = self._solve_rows(rows, self.lower, self.prices, self._sense)
@@ -176,9 +175,8 @@ class Program(LinearProblem):
             found = self._solve_levels(np.arange(len(self.lower))[rows])
         if found is None:
             return None
-        of_speed = found[1][self.inputs.size :][: len(self.multipliers)]
-        # np.clip takes three times as long
-        self.multipliers[:] = np.minimum(np.maximum(-of_speed, 0.0), _MOST_CURVED)
+        n = len(self.gradient)
+        self.multipliers[:] = found[1][n : n + len(self.multipliers)]
         return found[0], is_relaxed
 
     def _solve_rows(
@@ -190,19 +188,21 @@ class Program(LinearProblem):
         hard rows contradict each other. To change a model of DAQP takes half the time of a new one, and its
         answers are the same; the number of rows with a price must not change, because it sizes the memory.
         """
-        weights, slopes = prices[rows], self.slopes[rows][self.inputs.size :]
+        weights, slopes = prices[rows], self.slopes[rows][len(self.gradient) :]
         given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
-        size = len(weights), np.count_nonzero(weights)
+        size = rows is _EVERY or (len(weights), np.count_nonzero(weights))
         model = self._models.pop(size, None)
         if model is None:
             model = daqp.Model()
             model.settings = _DAQP
             flag, _ = model.setup(*given, sense[rows])
+            model.soft_weights(w_l=weights, w_u=weights)
         else:
             flag = model.update(*given, sense[rows])
+            if size is not True:
+                model.soft_weights(w_l=weights, w_u=weights)
         if flag < 0:
             return None
-        model.soft_weights(w_l=weights, w_u=weights)
         step, _, flag, info = model.solve()
         if flag not in (_SOLVED, _VIOLATED):
             return None
@@ -295,13 +295,14 @@ class Planner:
             bodies = find_bodies(question.zones, self.settings, as_predicted=True)
             obstacles = obstacles.joined(bodies)
         groups = obstacles.groups
-        key = has_floors, *((kind, *of.shape) for kind, of, _ in groups)
-        if key not in self._programs:
+        key = has_floors, *[(kind, *of.shape) for kind, of, _ in groups]
+        program = self._programs.get(key)
+        if program is None:
             if len(self._programs) >= _MOST_PROBLEMS:
                 self._programs.clear()
-            self._programs[key] = Program(self.settings, key[1:], has_floors)
+            program = Program(self.settings, key[1:], has_floors)
+            self._programs[key] = program
             self.budget.extend()
-        program = self._programs[key]
         program.take(groups)
         given = program.given
         given[:4], given[4:6], given[6:] = question[:3]
@@ -311,7 +312,7 @@ class Planner:
         program, s = self.prepare(question, has_floors), self.settings
         is_relaxed = is_converged = timed_out = False
         program.inputs[:], program.multipliers[:] = guess, self._on_speed
-        before = np.zeros(guess.size)
+        before: Array | None = None
         for _ in range(s.max_iterations):
             program.evaluate()
             solved = program.solve()
@@ -319,11 +320,11 @@ class Planner:
                 self._on_speed[:] = 0.0
                 return Plan(program.inputs.copy(), inf, (inf,), True, False)
             step, is_relaxed = solved
-            if step @ before < -(before @ before) / 2:
+            if before is not None and step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever
             before = step
             program.inputs += step.reshape(-1, 2)
-            is_converged = float(step @ step) <= CONVERGED**2
+            is_converged = hypot(*step.tolist()) <= CONVERGED
             timed_out = not is_converged and self.budget.is_spent
             if is_converged or timed_out:
                 break
@@ -336,4 +337,6 @@ class Planner:
             program.evaluate()
             is_relaxed = is_relaxed or program.is_violated()
         violations = program.sum_violations() if is_relaxed else ()
-        return Plan(inputs, program.sum_cost(), violations, is_relaxed, timed_out)
+        is_compared = is_relaxed or s.lookahead < inf
+        cost = program.sum_cost() if is_compared else 0.0
+        return Plan(inputs, cost, violations, is_relaxed, timed_out)

@@ -189,7 +189,7 @@ def list_conditions(
 
 
 def _write_conditions(
-    s: MPCSettings, kind: type[Obstacle], has_floors: bool, numbers: Any, at: Any
+    s: MPCSettings, kind: Any, has_floors: bool, numbers: Any, at: Any
 ) -> Any:
     """Values of the conditions on an obstacle of a `kind`, in symbols: satisfied where they are >= 0.
 
@@ -228,12 +228,18 @@ def _linearise_kind(
     return of_one.map(n, [True, False], [False, False])
 
 
+# Largest multiplier of the speed limit. Rows that contradict each other give huge ones, which would spoil
+# the next steps.
+_MOST_CURVED = 1e3
+
+
 @lru_cache(maxsize=64)
 def _linearise_motion(settings: MPCSettings) -> Any:
     """The part of a quadratic program without obstacles: see `LinearProblem`."""
     s, (inputs, given, states, cost) = settings, build_motion(settings)
     horizon, u, n = build_horizon(s), ca.vec(inputs), s.N
     distance, multipliers = ca.norm_2(given[4:6] - given[:2]), ca.SX.sym("speed", n)
+    curved_by = ca.fmin(ca.fmax(-multipliers, 0), _MOST_CURVED)
     scale = 2 / (distance + 1 + ca.fabs(distance - 1))
     velocity, slowed = (
         states[2:, 1:],
@@ -242,7 +248,7 @@ def _linearise_motion(settings: MPCSettings) -> Any:
     # a robot that is too fast slows down as it can
     limit = ca.fmax(s.v_max, ca.DM(horizon.times[1:]) * 0 + slowed)
     speed = limit**2 - ca.sum1(velocity**2).T
-    curved = ca.hessian(scale * cost - ca.dot(multipliers, speed), u)[0]
+    curved = ca.hessian(scale * cost - ca.dot(curved_by, speed), u)[0]
     if s.terminal == "rest":
         speed = ca.vertcat(speed, velocity[:, -1])
     is_end = np.arange(speed.numel()) >= n
@@ -275,7 +281,8 @@ class LinearProblem:
 
     Attributes
     ----------
-    inputs, given, multipliers : of the plan, shape (N, 2); see `Motion`; of the speed limits. To be filled.
+    inputs, given, multipliers : of the plan, shape (N, 2); see `Motion`; of the speed limits, negative where
+        one holds. To be filled.
     lower, upper, slopes : of the rows.
     hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
     first : number of rows before those of obstacles.

@@ -16,7 +16,7 @@ from .obstacles import Obstacle, Obstacles, Path, Priority, find_bodies
 from .people import STANDING_SPEED, Person, TrackedPeople
 from .problem import build_horizon, list_conditions
 from .settings import TOLERANCE, MPCSettings
-from .verification import Report, Row, verify_step
+from .verification import Report, Row, Sampled, verify_step
 from .ways import Way
 
 Status = Literal["optimal", "relaxed", "restarted", "braking"]
@@ -314,6 +314,10 @@ class Step:
 
     def _find_danger(self) -> str:
         return self.scene.find_danger(self.path, self.feasible)
+
+    def carry(self, way: Sampled) -> Sampled:
+        """The `way` of the disc, from that of the point which is planned for; here it is the same."""
+        return way
 
     def verify(self) -> Report:
         """Check this step again, by formulas that share no code with the controller."""

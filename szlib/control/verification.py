@@ -8,7 +8,7 @@ formula.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -80,28 +80,18 @@ class Sampled(NamedTuple):
     states: Array
 
 
-# points and times of the way of the disc, from that of the point which is planned for
-Carry = Callable[[Sampled], tuple[Array, Array]]
-
-
-def verify_step(step: Any, carry: Carry | None = None) -> Report:
-    """Check the plan of a `step` (a `Step`), and its claims.
-
-    Parameters
-    ----------
-    step : the step.
-    carry : the way of the disc from that of the point which is planned for; None: it is the same.
-    """
+def verify_step(step: Any) -> Report:
+    """Check the plan of a `step` (a `Step`), and its claims."""
     scene, s, x = step.scene, step.asked.settings, np.asarray(step.planned, float)
     lasts = s.dt * np.array(s.grid or [1] * s.N)
     way = _sample(np.array(step.asked.state), zip(step.inputs, lasts, strict=True))
     h = _measure(step.asked, x[:, :2], way.times[::PIECES], is_barrier=True)
     residual = h[:, 1:] - (1 - s.gamma) ** (lasts / s.dt) * h[:, :-1]
     worst = _find_worst(step.asked, x, h, residual)
-    path, times = carry(way) if carry else (way.points, way.times)
-    within, until = path[:_SAMPLES], times[:_SAMPLES]
-    of_disc = _measure(scene, within, until, is_barrier=True)
-    gap = _measure(scene, within, until).min(initial=np.inf)
+    path = step.carry(way).points
+    within = path[:_SAMPLES], way.times[:_SAMPLES]
+    of_disc = _measure(scene, *within, is_barrier=True)
+    gap = _measure(scene, *within).min(initial=np.inf)
     of_zones = of_disc[: len(scene.people)].min(initial=np.inf) + scene.settings.eps
     solids = scene.solids
     if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
@@ -117,7 +107,7 @@ def verify_step(step: Any, carry: Carry | None = None) -> Report:
         "residual": (residual[:, : s.N_h], step.residual),
         "slack": (slack, step.slack),
     }
-    if not carry:
+    if step.of_point is None:
         compared["control"] = step.control, step.inputs[0]
     tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
     faults = list[str]()
@@ -131,13 +121,13 @@ def verify_step(step: Any, carry: Carry | None = None) -> Report:
     undecided = min(abs(slack - TOLERANCE), abs(lowest + TOLERANCE)) <= tolerance
     # the bound of a step may be loose where somebody or the robot is fast
     fastest = max([np.hypot(*each.velocity) for each in scene.people], default=0.0)
-    reach = s.dt * fastest + 2 * np.abs(within - path[0]).sum(axis=1).max()
+    reach = s.dt * fastest + 2 * np.abs(within[0] - path[0]).sum(axis=1).max()
     undecided |= not step.safe and lowest <= reach
     if not undecided and (feasible, safe) != (step.feasible, step.safe):
         faults.append(
             f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
         )
-    faults += _check_guard(step, lasts, carry)
+    faults += _check_guard(step, lasts)
     return Report(tuple(faults), worst, slack, least, gap, feasible, safe)
 
 
@@ -164,22 +154,19 @@ def _sample(
     return Sampled(np.concatenate(points), np.concatenate(times), np.array(states))
 
 
-def _check_guard(step: Any, lasts: Array, carry: Carry | None) -> Iterator[str]:
+def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
     """What is wrong with `walls_safe` and `passively_safe` of a `step`, by many points of both ways.
 
-    Parameters
-    ----------
-    step : a `Step`, with the times `lasts` of its inputs.
-    carry : as of `verify_step`.
+    Its inputs have the times `lasts`.
     """
     scene, s, is_clear = step.scene, step.asked.settings, list[bool]()
     is_fixed = np.array([each.is_fixed for each in scene.barriers.items], bool)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
     for n in (1, s.N):
         inputs = zip(step.inputs[:n], lasts, strict=False)
-        way = _sample(np.array(step.asked.state), inputs, s)
-        points, times = carry(way) if carry else (way.points, way.times)
-        gaps = _measure(scene, points, times, as_predicted=False)
+        way = step.carry(_sample(np.array(step.asked.state), inputs, s))
+        points = way.points
+        gaps = _measure(scene, points, way.times, as_predicted=False)
         of_bodies = gaps[~is_fixed]
         if n == 1 and step.walls_safe and (gaps[is_fixed] < -TOLERANCE).any():
             yield "the step says that it can stop before every wall; it cannot"
@@ -198,32 +185,33 @@ def _find_worst(scene: Any, x: Array, h: Array, residual: Array) -> Row:
     s, lengths = scene.settings, np.array(scene.settings.grid or [1] * scene.settings.N)
     has_floors, found = s.decay_price < np.inf, list[tuple[Array, str, str, int]]()
     stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
-    condition = "the condition of {}{} from k = {} to {}"
+    condition = "the condition of {} from k = {} to {}"
     for i, each in enumerate(scene.barriers.items):
         if not each.has_barrier:
-            found.append((h[i, 1:], each.kind, "", i))
+            found.append((h[i, 1:], each.kind, condition, i))
         elif not has_floors:
-            found.append((residual[i, : s.N_h], each.kind, "", i))
+            found.append((residual[i, : s.N_h], each.kind, condition, i))
         elif each.is_fixed:
-            found.append((h[i, 1:] - stop**lengths * h[i, :-1], each.kind, "", i))
+            found.append(
+                (h[i, 1:] - stop**lengths * h[i, :-1], each.kind, condition, i)
+            )
         elif s.zone_price == np.inf:
-            found.append((h[i, 1 : s.N_h + 1], each.kind, "", i))
+            found.append((h[i, 1 : s.N_h + 1], each.kind, condition, i))
         if has_floors and isinstance(each, Zone):
             times = s.dt * np.cumsum([0, *lengths])
             places, _ = _find_places(scene.people[i], times, s, True)
             away = np.hypot(*(x[1:, :2] - places[1:]).T)
             gap = away - BODY_RADIUS - s.r_robot - s.body_gap
-            found.append((gap, "body", "the body of ", i))
-    found.append((s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1), "speed", "", -1))
+            name = condition.replace("of {}", "of the body of {}")
+            found.append((gap, "body", name, i))
+    slack = s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)
+    found.append((slack, "speed", "the speed limit at k = {2}", -1))
     if s.terminal == "rest":
-        found.append((-np.abs(x[-1:, 2:]).max(axis=1), "end", "", -1))
-    values, kind, whose, i = min(found, key=lambda each: float(each[0].min()))
+        found.append((-np.abs(x[-1:, 2:]).max(axis=1), "end", "rest at the end", -1))
+    values, kind, name, i = min(found, key=lambda each: float(each[0].min()))
     k = int(values.argmin())
-    name = condition.format(whose, scene.name(i), k, k + 1) if i >= 0 else kind
-    name = {"speed": f"the speed limit at k = {k + 1}", "end": "rest at the end"}.get(
-        kind, name
-    )
-    return Row(kind, name, float(values[k]))
+    of = scene.name(i) if i >= 0 else ""
+    return Row(kind, name.format(of, k, k + 1), float(values[k]))
 
 
 def _measure(

@@ -29,7 +29,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import Obstacles, Zone, find_bodies, find_places
+from .obstacles import Obstacles, Zone, ellipse_formula, find_bodies, find_places
 from .people import STANDING_SPEED
 from .settings import MPCSettings
 
@@ -671,21 +671,22 @@ def find_target(
     walk across the way, because they clear it themselves, nor for a person who stands on the goal. The
     nearest person counts.
     """
-    # complex numbers: the conjugate of u times v has the angle from u to v
-    s, at, end = settings, complex(*position), complex(*goal)
-    way, nearest, chosen, margin = end - at, inf, None, s.r_robot + s.eps
-    for zone in zones if way and s.head_on_share else ():
-        velocity = complex(*zone[7:9])
-        across = abs((way.conjugate() * velocity).imag)
-        if across > s.head_on_share * abs(velocity) * abs(way):
+    s, (x, y), chosen, away = settings, position, None, dist(position, goal)
+    wx, wy = goal[0] - x, goal[1] - y
+    nearest, margin = away, s.r_robot + s.eps
+    time = s.dt * max(1 / s.gamma, sum(s.step_lengths))
+    for zone in zones if away and s.head_on_share else ():
+        vx, vy = zone[7:9]
+        speed = hypot(vx, vy)
+        if abs(wx * vy - wy * vx) > s.head_on_share * speed * away:
             continue
-        h = Zone.distance(*position, 0.0, *zone) - margin
-        closing = (s.v_max + abs(velocity)) * s.dt
-        reach = max(closing / s.gamma, closing * sum(s.step_lengths))
-        if h <= min(nearest, abs(way), reach):
+        h = ellipse_formula(x, y, *zone[:5]) - margin
+        if h <= min(nearest, (s.v_max + speed) * time):
             nearest, chosen = h, zone
-    if chosen:
-        end = at + way * _turn_aside(at, end, chosen, fixed, s)
+    if not chosen:
+        return goal
+    at, end = complex(x, y), complex(*goal)
+    end = at + (end - at) * _turn_aside(at, end, chosen, fixed, s)
     return end.real, end.imag
 
 
@@ -693,6 +694,7 @@ def _turn_aside(
     at: complex, end: complex, zone: Sequence[float], fixed: Obstacles, s: MPCSettings
 ) -> complex:
     """By what the way from `at` to the `end` is turned, to pass a person with this `zone`."""
+    # complex numbers: the conjugate of u times v has the angle from u to v
     way, semi_axis = end - at, zone[4] + s.r_robot + s.eps  # of the set h < 0
     a, b = complex(*zone[:2]) - at, complex(*zone[2:4]) - at
     is_on_goal = Zone.distance(end.real, end.imag, 0.0, *zone) < s.r_robot + s.eps
