@@ -30,8 +30,8 @@ from szlib.core.errors import DataError, warn
 from szlib.core.input_files import read_small, reading
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
+from szlib.tracks.readers import check_names
 from szlib.tracks.recipe import Recipe
-from szlib.tracks.recordings import check_names
 from szlib.tracks.shapes import read_magni_rows
 
 # frames a second of the video of Grand Central; every 20th is annotated

@@ -38,9 +38,8 @@ from ..core.input_files import (
 from ..core.parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.clock import read_tracks, to_clock
-from ..tracks.readers import find_day, find_format, read_raw
+from ..tracks.readers import find_day, find_format, name_recordings, read_raw
 from ..tracks.recipe import Recipe, find_recipe
-from ..tracks.recordings import name_recordings
 from .areas import AUTO, as_area, has_calendar
 from .finding import find_encounters, find_place
 from .geometry import Area, AttentionalSpace

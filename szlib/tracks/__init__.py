@@ -6,8 +6,7 @@ shapes        other files and tables as columns: Parquet, Feather, SQLite, JSON,
 funnels       how many rows entered each stage, and why others were rejected; whether people move as they can
 plausibility  with which other recipe people would walk
 columns       which column holds what; from columns to rows in seconds and metres
-recordings    several files: pieces of one recording, or others
-readers       rows of files as they are: `read_raw`
+readers       rows of files as they are: `read_raw`; several files: pieces of one recording, or others
 clock         rows brought to multiples of 0.1 s, with velocities: `read_tracks`, `to_clock`
 datasets      named data and paths, downloads verified by hash
 """

@@ -151,18 +151,16 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
         ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows"
     )
     row, columns, n_covered = _on_clock(t, raw[["x", "y"]].to_numpy(float).T, within)
-    table = pd.DataFrame(
-        {"day": raw["day"].astype("category").array.take(row)}
-        | {"id": raw["id"].to_numpy()[row]}
-        | dict(zip(COLUMNS[2:], columns, strict=True)),
-        copy=False,
-    )
-    if len(t) - n_covered > _MOST_LOST * len(t) + _FEW:
+    people = raw["day"].astype("category").array.take(row), raw["id"].to_numpy()[row]
+    named = dict(zip(COLUMNS, [*people, *columns], strict=True))
+    table = pd.DataFrame(named, copy=False)
+    n_lost = len(t) - n_covered
+    if n_lost > _MOST_LOST * len(t) + _FEW:
         raise DataError(
-            f"{len(t) - n_covered:,} of {len(t):,} samples lie in pieces shorter than a step of 0.1 s: "
+            f"{n_lost:,} of {len(t):,} samples lie in pieces shorter than a step of 0.1 s: "
             "are times seconds, and ids people?  Else pass time_unit or frame_rate, or a longer max_gap"
         )
-    rejected = {"in a gap-free piece that covers no tick": len(t) - n_covered}
+    rejected = {"in a gap-free piece that covers no tick": n_lost}
     stage = funnels.stage("clock: samples", len(t), n_covered, rejected)
     table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
     return funnels.attach(table, [*funnels.get(raw), stage])
@@ -339,9 +337,7 @@ def check_tracks(tracks: pd.DataFrame) -> None:
             'the table has no funnel; expected its stages in .attrs["funnel"]'
         )
     for stage in stages:
-        funnels.stage(
-            stage["stage"], stage["entered"], stage["kept"], stage["rejected"]
-        )
+        funnels.stage(*stage.values())
 
 
 def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:

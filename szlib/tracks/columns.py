@@ -10,16 +10,15 @@ import unicodedata
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
-from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
 import polars as pl
-from polars import col
+from polars import Float64, Int64, Series, String, col, exceptions
 
 from ..core.errors import DataError
+from ..core.input_files import explained
 from .plausibility import suggest_columns
 from .recipe import DEGREES, NAMES, PIXELS, SHAPES, TIME_UNITS, Recipe, advise
 from .shapes import open_arrow, open_database, open_json, open_shape
@@ -33,7 +32,6 @@ _LISTED = 40  # number of columns that are looked at
 _PIXEL = 0.02  # metres in a pixel that an error message shows as an example
 _TRIED = 8  # number of columns that are tried out, with those that are known
 _SAMPLE = 2000  # rows in which columns are guessed
-_DAY = 86_400  # [s]
 
 # Times without a unit whose median is larger count in this unit since 1970: as seconds they would be
 # later than the year 5000.
@@ -46,18 +44,29 @@ _EXACT = 2.0**53  # floats hold smaller whole numbers exactly
 
 
 def open_source(file: File) -> tuple[Source, Recipe]:
-    """The columns of a `file`, and its recipe over that of its shape."""
+    """The columns of a `file`, and its recipe over that of its shape.
+
+    Of the tables of a database it is the one that can be tracks.
+    """
     path, recipe, head = file.path, file.recipe, file.head
-    shape = recognise(head, path, recipe)
-    is_free, tables = recipe.file_format is None, list[Source]()
-    if is_free and shape.name == "jupedsim":
-        tables = open_database(file)
+    shape, readable = recognise(head, path, recipe), list[Source]()
+    is_free = recipe.file_format is None
+    tables = open_database(file) if is_free and shape.name == "jupedsim" else []
     if any({"frame", "id", "pos_x"} <= set(table.names) for table in tables):
         tables = []  # PedPy reads them
+    for table in tables:
+        with suppress(DataError):
+            find_columns(table, recipe)
+            readable.append(table)
+    if len(readable) > 1:
+        command = f"sqlite3 -header -csv {path.name} 'SELECT * FROM NAME' > tracks.csv"
+        raise DataError(
+            f"{path}: several of the tables {len(tables)} can be tracks; write one to a file: {command}"
+        )
     if head.startswith(CONTAINERS):
         source = open_arrow(file)
     elif tables:
-        source = _choose_table(tables, recipe)
+        source = (readable or tables)[0]
     elif head.lstrip().startswith(("{", "[")) and not shape.parse:
         source = open_json(file)
     else:
@@ -73,45 +82,33 @@ def open_source(file: File) -> tuple[Source, Recipe]:
     return source, replace(recipe.over(base), file_format=shape.name)
 
 
-def _choose_table(tables: list[Source], recipe: Recipe) -> Source:
-    """The one of the tables of a database that can be tracks."""
-    readable, refused = [], []
-    for table in tables:
-        try:
-            find_columns(table, recipe)
-            readable.append(table)
-        except DataError as error:
-            refused.append(error)
-    if len(readable) > 1:
-        path = readable[0].where
-        command = f"sqlite3 -header -csv {path.name} 'SELECT * FROM NAME' > tracks.csv"
-        raise DataError(
-            f"{path}: several of the tables {len(tables)} can be tracks; write one to a file: {command}"
-        )
-    if not readable:
-        raise refused[0]
-    return readable[0]
-
-
 def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
     """The rows of a `source`, read with a `recipe`; `ask` about a column that may tell recordings apart.
 
     Raises DataError where columns are missing or unclear, or a value of the recipe does not fit.
     """
-    named, path = recipe.names_people, source.where
+    named, path, decimal = recipe.names_people, source.where, source.decimal
     recipe = find_columns(source, recipe)
     values = {name: column_of(source, at) for name, at in recipe.columns.items()}
-    t, day = _read_times(values, recipe, source)
-    places = [name for name in ("x", "y", "speed") if name in values]
-    numbers = [to_numbers(values[name], source.decimal).alias(name) for name in places]
-    ids = to_ids(values["id"], path)
-    table = pl.DataFrame([t.alias("t"), ids.alias("id"), *numbers])
+    numbers = {
+        name: to_numbers(column, decimal)
+        for name, column in values.items()
+        if name in ("frame", "x", "y", "speed")
+    }
+    if "frame" in numbers:
+        t, day = numbers.pop("frame") * (1 / (recipe.frame_rate or 1.0)), None
+    else:
+        tz, unit = recipe.tz or "UTC", recipe.time_unit
+        t, day = to_times(values["t"], tz, unit, decimal)
+    table = pl.DataFrame({"t": t, "id": to_ids(values["id"], path), **numbers})
     table = table.with_row_index("line", source.first_line)
     if "day" in values:
-        text = values["day"].cast(pl.String).str.strip_chars(' "')
+        text = values["day"].cast(String).str.strip_chars(' "')
         day = text.set(text == "", None)
-    elif ask and recipe.file_format == "tidy":
-        ask_about_recordings(source, recipe, table, by_name=not named)
+    else:
+        day = None if recipe.tz else day
+        if ask and recipe.file_format == "tidy":
+            ask_about_recordings(source, recipe, table, by_name=not named)
     table = to_metres(table.with_columns(ragged=source.ragged), recipe, path)
     if day is not None:
         table = table.with_columns(day=day)
@@ -119,22 +116,6 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
         wanted = column_of(source, recipe.where).fill_null(False)
         table = table.filter(wanted | table["ragged"])
     return Rows(path, recipe, table.lazy(), source)
-
-
-def _read_times(
-    values: dict[str, pl.Series], recipe: Recipe, source: Source
-) -> tuple[pl.Series, pl.Series | None]:
-    """The times [s]; and the local date of each, where the file states its zone."""
-    if "frame" in values:
-        frames = to_numbers(values["frame"], source.decimal)
-        return frames * (1 / (recipe.frame_rate or 1.0)), None
-    t, day = to_times(values["t"], recipe.tz or "UTC", recipe.time_unit, source.decimal)
-    if recipe.file_format == "lace-lhmp":  # may count from midnight of the day MMDD
-        with suppress(ValueError):
-            date = datetime.strptime(f"2012{source.where.name[:4]}", "%Y%m%d")
-            midnight = date.replace(tzinfo=ZoneInfo("Asia/Tokyo")).timestamp()
-            t += midnight * (t < _DAY).cast(pl.Float64)
-    return t, None if recipe.tz else day
 
 
 def to_metres(table: pl.DataFrame, recipe: Recipe, path: Path) -> pl.DataFrame:
@@ -176,33 +157,22 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
         origin; it says which columns look like what.
     """
     names, where, given = source.names, f"{source.where}{source.head}", recipe.columns
-    found, missing = dict(given), list[str]()
-    for k in given.values():
-        if isinstance(k, int) and not 0 <= k < len(names):
-            raise DataError(
-                f"{where} has no field {k}; it has {len(names)}, the first is 0"
-            )
-    at = {
-        quantity: _candidates(quantity, recipe, names) for quantity in NAMES["columns"]
-    }
-    is_free = "t" not in given and at["frame"]
-    is_frame = is_free and (not at["t"] or recipe.frame_rate is not None)
-    time = "frame" if "frame" in given or is_frame else "t"
-    for quantity in (time, "id", "x", "y", *(["day"] if at["day"] else [])):
+    at = {name: _candidates(name, recipe, names) for name in NAMES["columns"]}
+    is_frame = "frame" in given or not at["t"] or recipe.frame_rate is not None
+    time = "frame" if at["frame"] and "t" not in given and is_frame else "t"
+    needed = [time, "id", "x", "y", *(["day"] if at["day"] else [])]
+    for quantity in needed:
         if len(at[quantity]) > 1:
             same = sorted(map(str, set(at[quantity])))
             advice = advise(columns={**given, quantity: at[quantity][0]})
             unclear = f"{', '.join(same)} can all be {quantity}; {advice}"
             twice = f"names {same[0]} twice; rename one of them"
             raise DataError(f"{where}: {unclear if len(same) > 1 else twice}")
-        if at[quantity]:
-            found[quantity] = at[quantity][0]
-        else:
-            missing.append(quantity)
-    if missing:
+    found = {**given, **{name: at[name][0] for name in needed if at[name]}}
+    if missing := [name for name in needed if not at[name]]:
         known = ", ".join(repr(name or k) for k, name in enumerate(names[:12]))
-        advice = suggest_reading(source, replace(recipe, columns=found))
         columns = found | dict.fromkeys(missing, "...")
+        advice = suggest_reading(source, replace(recipe, columns=found))
         advice = advice or f"it has {known}; {advise(columns=columns)}"
         raise DataError(f"{where} has no column {', '.join(missing)}; {advice}")
     stated = {q: _split_unit(name)[1] for q, name in found.items() if name in names}
@@ -240,25 +210,28 @@ def _require_known(where: str, recipe: Recipe) -> None:
         )
 
 
-def column_of(source: Source, at: str | int) -> pl.Series:
+def column_of(source: Source, at: str | int) -> Series:
     """The column of a `source` `at` a number or a name; or the sum of columns that it says, in SQL."""
-    if isinstance(at, int):
-        return source.column(at)
+    names = [name or f"f{k}" for k, name in enumerate(source.names)]
     if at in source.names:
-        return source.column(source.names.index(at))
-    known = {name or f"f{k}": k for k, name in enumerate(source.names)}
+        at = source.names.index(at)
+    if isinstance(at, int):
+        if not 0 <= at < len(names):
+            raise DataError(
+                f"{source.where} has no field {at}; it has {len(names)}, the first is 0"
+            )
+        return source.column(at)
     lacks = f"{source.where} has no column {at}"
-    try:
+    faults = exceptions.PolarsError
+    with explained(lacks, "and it is no sum of columns", faults=faults):
         sum_ = pl.sql_expr(at)
         roots = sum_.meta.root_names()
-        if not roots or not set(roots) <= known.keys():
-            raise DataError(f"{lacks}; it has {list(known)[:12]}")
-        columns = {root: source.column(known[root]) for root in roots}
+        if not roots or not set(roots) <= set(names):
+            raise DataError(f"{lacks}; it has {names[:12]}")
+        columns = {root: source.column(names.index(root)) for root in roots}
         if not re.search(r"\|\||'", at):
             columns = {k: to_numbers(v, source.decimal) for k, v in columns.items()}
         return pl.DataFrame(columns).select(sum_.alias("c")).to_series()
-    except pl.exceptions.PolarsError as error:
-        raise DataError(f"{lacks}, and it is no sum of columns ({error})") from error
 
 
 def ask_about_recordings(
@@ -279,7 +252,7 @@ def ask_about_recordings(
         is_used = shown in used or k in recipe.columns.values() or _CLOCK.search(key)
         if is_used or not (is_mixed or is_usual):
             continue
-        table = rows.select("id", "t", c=source.column(k).cast(pl.String))
+        table = rows.select("id", "t", c=source.column(k).cast(String))
         n_pieces = table.select("id", "c").n_unique()
         if table["c"].n_unique() < 2 or n_pieces * _LONGEST_SHARE > len(rows):
             continue
@@ -322,13 +295,19 @@ def suggest_reading(source: Source | None, recipe: Recipe) -> str:
     if source is None:
         return ""
     time, columns = recipe.columns.get("t"), dict[str | int, np.ndarray]()
-    given = [
-        recipe.columns[q] for q in ("t", "frame", "id", "x", "y") if q in recipe.columns
+    quantities = [
+        name for name in ("t", "frame", "id", "x", "y") if name in recipe.columns
     ]
+    given = [recipe.columns[name] for name in quantities]
     names = [name or k for k, name in enumerate(source.names[:_LISTED])]
     for at in dict.fromkeys([*given, *(names if len(given) < 4 else [])]):
+        values = column_of(source, at).head(_SAMPLE)
         unit = recipe.time_unit if at == time else None
-        numbers = _as_floats(column_of(source, at).head(_SAMPLE), unit)
+        found = [to_times(values, "UTC", unit, decimal)[0] for decimal in ".,"]
+        usual = min(found, key=Series.null_count)
+        if 2 * usual.null_count() > len(values):  # of texts each gets a number
+            usual = to_ids(values, source.where).cast(Float64)
+        numbers = usual.fill_null(np.nan).to_numpy()
         usable = numbers[np.isfinite(numbers)]
         is_varied = 2 * len(usable) > len(numbers) and np.ptp(usable) > 0
         if at in given or (is_varied and len(columns) < _TRIED):
@@ -336,31 +315,22 @@ def suggest_reading(source: Source | None, recipe: Recipe) -> str:
     return suggest_columns(columns, recipe)
 
 
-def _as_floats(values: pl.Series, unit: str | None) -> np.ndarray:
-    """A column as floats, whatever it holds: numbers, times, or texts of which each gets a number."""
-    for decimal in ".,":
-        times = to_times(values, "UTC", unit, decimal)[0]
-        if 2 * times.null_count() <= len(values):
-            return times.fill_null(np.nan).to_numpy()
-    return to_ids(values, Path()).cast(pl.Float64).fill_null(np.nan).to_numpy()
-
-
 # --- values -------------------------------------------------------------------------------------------
 
 
-def to_numbers(values: pl.Series, decimal: str = ".") -> pl.Series:
+def to_numbers(values: Series, decimal: str = ".") -> Series:
     """The numbers in a column of `values`; null where one is no number.  `decimal` is the point of texts."""
-    if values.dtype == pl.String:
+    if values.dtype == String:
         values = values.str.strip_chars(" \"'").str.replace(decimal, ".", literal=True)
     try:
-        return values.cast(pl.Float64, strict=False)
-    except pl.exceptions.PolarsError:  # a list, an object
-        return pl.repeat(None, len(values), dtype=pl.Float64, eager=True)
+        return values.cast(Float64, strict=False)
+    except exceptions.PolarsError:  # a list, an object
+        return pl.repeat(None, len(values), dtype=Float64, eager=True)
 
 
 def to_times(
-    values: pl.Series, tz: str, unit: str | None = None, decimal: str = "."
-) -> tuple[pl.Series, pl.Series | None]:
+    values: Series, tz: str, unit: str | None = None, decimal: str = "."
+) -> tuple[Series, Series | None]:
     """The times in a column of `values`: numbers with a point `decimal`, dates, durations, ISO texts.
 
     Numbers are in a `unit` of time; None takes seconds, or a shorter unit for counts since 1970.  Times
@@ -368,23 +338,21 @@ def to_times(
     of each where the column states its zone, else None.
     """
     numbers, day = to_numbers(values, decimal), None
-    if values.dtype == pl.String and 2 * numbers.null_count() > len(values):
+    if values.dtype == String and 2 * numbers.null_count() > len(values):
         text = values.str.strip_chars(" \"'")
         dates = text.set(~text.str.contains(_DATE).fill_null(False), None).to_pandas()
         parsed = pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce")
         has_zone = text.str.contains(_ZONE).fill_null(False).to_numpy()
-        zone = "UTC" if has_zone.any() else None
-        if zone:
-            parsed = parsed.where(has_zone)
+        values = Series(parsed).dt.replace_time_zone(None)
+        if has_zone.any():
+            values = Series(parsed.where(has_zone)).dt.replace_time_zone("UTC")
             day = text.str.slice(0, 10).str.to_date("%Y-%m-%d", strict=False)
-        if parsed.notna().any():
-            values = pl.Series(parsed).dt.replace_time_zone(zone)
     elif unit == "days" and not values.dtype.is_temporal():
         ms = ((numbers - _EXCEL_1970) * 86_400_000).round()
-        values = ms.cast(pl.Int64, strict=False).cast(pl.Datetime("ms"))
+        values = ms.cast(Int64, strict=False).cast(pl.Datetime("ms"))
     if values.dtype == pl.Duration:
         return values.dt.total_nanoseconds() / 1e9, None
-    if isinstance(values.dtype, pl.Datetime | pl.Date):
+    if values.dtype.is_temporal() and values.dtype != pl.Time:
         zone = getattr(values.dtype, "time_zone", None)
         moments = values.cast(pl.Datetime("ns", zone))
         if zone is None:
@@ -399,7 +367,7 @@ def to_times(
     return numbers * TIME_UNITS[unit or usual], None
 
 
-def to_ids(values: pl.Series, where: Path) -> pl.Series:
+def to_ids(values: Series, where: Path) -> Series:
     """The ids in a column of `values` as whole numbers; null where one is missing or no whole number.
 
     Where most are no numbers, each text gets a number, the same in every file: 53 bits of a hash, so that two
@@ -407,21 +375,21 @@ def to_ids(values: pl.Series, where: Path) -> pl.Series:
     two texts are one number.
     """
     if values.dtype.is_nested():
-        return pl.repeat(None, len(values), dtype=pl.Int64, eager=True)
+        return pl.repeat(None, len(values), dtype=Int64, eager=True)
     if not values.dtype.is_numeric():
-        values = values.cast(pl.String).str.strip_chars(" \"'")
+        values = values.cast(String).str.strip_chars(" \"'")
         values = values.set(values == "", None)
-    number = values.cast(pl.Float64, strict=False)
-    if values.dtype == pl.String and 2 * number.count() < values.count():
+    number = values.cast(Float64, strict=False)
+    if values.dtype == String and 2 * number.count() < values.count():
         names = values.drop_nulls().unique()
         hashes = pd.util.hash_array(names.to_numpy().astype(object), categorize=False)
-        numbers = pl.Series((hashes >> _SHORT).astype("int64"))
+        numbers = Series((hashes >> _SHORT).astype("int64"))
         return values.replace_strict(names, numbers, default=None)
     is_whole = (number == number.floor()) & (number.abs() < _EXACT)
-    whole = number.set(~is_whole, None).cast(pl.Int64, strict=False)
+    whole = number.set(~is_whole, None).cast(Int64, strict=False)
     if not values.dtype.is_float():
-        whole = values.cast(pl.Int64, strict=False).fill_null(whole)
-    if values.dtype == pl.String:
+        whole = values.cast(Int64, strict=False).fill_null(whole)
+    if values.dtype == String:
         known = pl.DataFrame({"text": values, "id": whole}).drop_nulls().unique()
         alike = known.filter(col.id.is_duplicated()).sort("id", "text")["text"]
         if len(alike):

@@ -1,9 +1,9 @@
 """Named data and paths: a real day of the ATC mall, ten days of its middle, or the user's own files.
 
 The real day is the public 1 Hz version of 2012-10-24, pinned to a commit and to the SHA-256 of each
-file; of hour 12 it holds one file of two (10 % of the people).  The ten days (2012-10-24 to 2012-11-25) are
-those of LaCE-LHMP, ``MMDD.csv``, pinned to the git blob id of each file.  They cover x from -25 to 0 m and y
-from -10 to 15 m, which holds the square; their times may count from the start of the day.
+file (`datasets.toml`); of hour 12 it holds one file of two (10 % of the people).  The ten days (2012-10-24 to
+2012-11-25) are those of LaCE-LHMP, ``MMDD.csv``, pinned to the git blob id of each file.  They cover x from
+-25 to 0 m and y from -10 to 15 m, which holds the square; their times may count from the start of the day.
 The ATC data are free for research; cite Brscic, Kanda, Ikeda, Miyashita, "Person tracking in large public
 spaces using 3-D range sensors", IEEE Trans. Human-Machine Systems 43(6), 2013.
 """
@@ -13,20 +13,22 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Callable, Sequence
+import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pooch
 
 from ..core.errors import DataError, warn
-from ..core.input_files import printable
+from ..core.input_files import explained, printable
 
 SYNTHETIC = "synthetic"
 # A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network.
 DATA_DIR_VARIABLE = "SZLIB_DATA_DIR"
 
 _LONGEST_LABEL = 60
+_BLOB_ID = 40  # digits of a blob id of git; SHA-256 has more
 _ATTEMPTS = 3  # number of times that a file with a wrong hash is fetched
 
 
@@ -39,46 +41,28 @@ def git_blob_id(file: str | Path) -> str:
 
 @dataclass(frozen=True)
 class DataSet:
-    """Files on the network, each with a hash of its content.
+    """Files on the network, an entry of `datasets.toml`.
 
     Attributes
     ----------
     url : folder of the files.
-    hashes : hash by file name.
-    hash_file : computes the hash of a file.
+    hashes : hash of its content by file name: SHA-256, or the shorter `git_blob_id`.
     """
 
     url: str
     hashes: dict[str, str]
-    hash_file: Callable[[str], str]
 
     def find_fault(self, file: Path) -> str:
         """What is wrong with the content of a `file` of this name; empty if nothing is."""
-        found, expected = self.hash_file(str(file)), self.hashes[file.name]
+        expected = self.hashes[file.name]
+        hash_file = git_blob_id if len(expected) == _BLOB_ID else pooch.file_hash
+        found = hash_file(str(file))
         return "" if found == expected else f"its hash is {found}, expected {expected}"
 
 
-def _read_hashes(name: str) -> dict[str, str]:
-    """Hash by file name, from a list "hash  name"."""
-    text = (Path(__file__).parent / "hashes" / f"{name}.txt").read_text("utf-8")
-    return {file: value for value, file in map(str.split, text.splitlines())}
-
-
+_ENTRIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 # Data sets by name.
-DATA_SETS = {
-    "atc-1hz": DataSet(
-        "https://raw.githubusercontent.com/test-bai-cpu/online-mod/"
-        "1b44eb4f1be13a669d0b8349d4c71dbb8711078e/dataset/atc/split_data_random/",
-        _read_hashes("atc-1hz"),
-        pooch.file_hash,
-    ),
-    "atc-10-days": DataSet(
-        "https://raw.githubusercontent.com/test-bai-cpu/LaCE-LHMP/"
-        "ef93d1265ab26cb0a3084dc2e267579b11614607/atc_data/middle_area/",
-        _read_hashes("atc-10-days"),
-        git_blob_id,
-    ),
-}
+DATA_SETS = {name: DataSet(**entry) for name, entry in _ENTRIES.items()}
 NAMES = (SYNTHETIC, *DATA_SETS)
 _NAMED = ", ".join(map(repr, NAMES))
 
@@ -141,7 +125,15 @@ def _find_named(name: str) -> list[Path]:
     """The files of a named data set, each with the right hash."""
     data = DATA_SETS[name]
     if folder := os.environ.get(DATA_DIR_VARIABLE):
-        return [_verify(Path(folder) / name / file, data) for file in data.hashes]
+        files = [Path(folder) / name / file for file in data.hashes]
+        for file in files:
+            if not file.is_file():
+                raise DataError(
+                    f"{file}: no such file; ${DATA_DIR_VARIABLE} must name a folder with {name}/ in it"
+                )
+            if fault := data.find_fault(file):
+                raise DataError(f"{file}: {fault}; it is damaged or of another version")
+        return files
     store = pooch.create(
         path=pooch.os_cache("szlib") / name,
         base_url=data.url,
@@ -167,38 +159,23 @@ def _fetch(store: pooch.Pooch, name: str, data: DataSet) -> Path:
     raise OSError(f"{name}: {fault}")
 
 
-def _verify(file: Path, data: DataSet) -> Path:
-    """The file, if it is there and has the right hash."""
-    if not file.is_file():
-        raise DataError(
-            f"{file}: no such file; ${DATA_DIR_VARIABLE} must name a folder with {file.parent.name}/ in it"
-        )
-    if fault := data.find_fault(file):
-        raise DataError(f"{file}: {fault}; the file is damaged or of another version")
-    return file
-
-
 def _expand(name: str | Path) -> list[Path]:
     """The regular files that a path stands for; reading a FIFO or a device would never end."""
     path, shown = Path(name), printable(name)
-    try:
+    with explained(f"{shown}: cannot be looked up", f"expected {_NAMED}, or paths"):
         found = [path] if path.exists() or path.is_symlink() else []
         if path.is_dir():
             found = [file for file in path.iterdir() if not file.name.startswith(".")]
         elif not found:
             found = list(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
-    except (OSError, ValueError, NotImplementedError, IndexError, re.error) as error:
-        raise DataError(
-            f"{shown}: cannot be looked up ({error}); expected {_NAMED}, or paths"
-        ) from error
-    files = sorted(file for file in found if file.is_file())
+    files = sorted(filter(Path.is_file, found))
     if not files:
         reason = "is no regular file (or leads nowhere)" if found else "no such file"
         raise DataError(
             f"{shown}: {reason}; expected {_NAMED}, or a file, folder or glob of tracks"
         )
-    folders = [file for file in found if path.is_dir() and file.is_dir()]
-    if others := len(found) - len(files) - len(folders):
+    inner = sum(map(Path.is_dir, found)) if path.is_dir() else 0
+    if others := len(found) - len(files) - inner:
         warn(
             f"{shown}: left out what is no regular file: {others} x folder or other", 4
         )

@@ -23,6 +23,7 @@ from ..core.errors import DataError, SzlibError, warn
 from .recipe import Recipe, advise
 from .sources import Rows
 
+Stages = Sequence[Mapping[str, Any]]
 KEY = "funnel"
 # How the name of a stage begins that rejects nothing, but says what is implausible.
 WARNING = "warning: "
@@ -93,7 +94,7 @@ def get(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return list(frame.attrs.get(KEY, []))
 
 
-def warnings(stages: Sequence[Mapping[str, Any]]) -> list[str]:
+def warnings(stages: Stages) -> list[str]:
     """What is implausible in the rows of these `stages`, as texts.
 
     Examples
@@ -106,7 +107,7 @@ def warnings(stages: Sequence[Mapping[str, Any]]) -> list[str]:
     return [n.removeprefix(WARNING) for n in names if n.startswith(WARNING)]
 
 
-def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+def attach(frame: pd.DataFrame, stages: Stages) -> pd.DataFrame:
     """Attach `stages` to `frame` and return it; example at `get`."""
     frame.attrs[KEY] = [dict(s) for s in stages]
     return frame
@@ -129,7 +130,7 @@ def select(
     return attach(kept, [*get(frame), stage(name, len(frame), len(kept), rejected)])
 
 
-def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+def table(stages: Stages) -> pd.DataFrame:
     """The funnel `stages` as a table: a row for entered and for kept, and one for each reason.
 
     Examples
@@ -149,18 +150,17 @@ def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["stage", "what", "rows"])
 
 
-def text(stages: Sequence[Mapping[str, Any]]) -> str:
+def text(stages: Stages) -> str:
     """The table of `stages` as plain text in which each stage is named once."""
     lines = table(stages)
-    lines["stage"] = lines["stage"].where(~lines["stage"].duplicated(), "")
-    wide = {name: int(lines[name].str.len().max()) for name in ("stage", "what")}
-    return "\n".join(
-        f"{row.stage:<{wide['stage']}}  {row.what:<{wide['what']}} {row.rows:>12,}"
-        for row in lines.itertuples()
-    )
+    lines["stage"] = lines["stage"].mask(lines["stage"].duplicated(), "")
+    lines["rows"] = lines["rows"].map("{:11,}".format)
+    for name in ("stage", "what"):
+        lines[name] = lines[name].str.ljust(int(lines[name].str.len().max()))
+    return "\n".join(map("  ".join, lines.to_numpy()))
 
 
-def add(funnels: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
     """Add up several `funnels`, stage by stage of the same name, in the order of first occurrence.
 
     Examples

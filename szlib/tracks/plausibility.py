@@ -46,17 +46,15 @@ def _changes(
     Each with the columns of t (or frame), id, x and y, None where one is free, and the factors of these four.
     """
     given, metres = recipe.columns, recipe.metres
-    rate, is_frame = recipe.frame_rate or _FRAMES, "frame" in given
     people: dict[str, Any] = {name: given.get(name) for name in ("id", "x", "y")}
-    clocks = {"frame": 1 / rate} if is_frame else {"t": 1.0, "frame": 1 / rate}
-    for name, t in clocks.items():
-        is_guess = name == "frame" and not recipe.frame_rate
-        more: dict[str, Any] = {"frame_rate": rate} if is_guess else {}
-        known = {name: given.get("frame", given.get("t")), **people}
-        yield more, known, [t, 1, metres, metres]
-        for unit in ("m", "mm", "cm", "ft"):
-            yield {"unit": unit, **more}, known, [t, 1, UNITS[unit], UNITS[unit]]
     known = {"t": given.get("t"), **people}
+    rate, is_frame = recipe.frame_rate or _FRAMES, "frame" in given
+    more: dict[str, Any] = {} if recipe.frame_rate else {"frame_rate": rate}
+    counted = {"frame": given.get("frame", given.get("t")), **people}, more, 1 / rate
+    for names, extra, t in [counted] if is_frame else [(known, {}, 1.0), counted]:
+        yield extra, names, [t, 1, metres, metres]
+        for unit in ("m", "mm", "cm", "ft"):
+            yield {"unit": unit, **extra}, names, [t, 1, UNITS[unit], UNITS[unit]]
     if None in known.values():
         return
     for unit in () if recipe.time_unit else ("ms", "days"):

@@ -12,21 +12,20 @@ from dataclasses import replace
 from functools import partial
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import polars as pl
-from polars import col
+from polars import Expr, LazyFrame, Series, String, col, exceptions, lit
 
 from ..core.errors import DataError, warn
-from ..core.input_files import printable
+from ..core.input_files import explained, printable
 from . import funnels
 from .columns import column_of, load_rows, open_source, suggest_reading
 from .funnels import check_people, find_implausible, rejection_reason
 from .plausibility import describe_rows
 from .recipe import SHAPES, Recipe, advise, find_recipe
-from .recordings import LoadedFile, file_stem, separate_recordings
 from .shapes import open_table
 from .sources import SCANNED, Rows, charge, is_table, opened, scan_streamed
 
@@ -43,8 +42,35 @@ MOST_DOUBLED = 0.2
 CALENDAR_BEGINS = 1e8
 _HEAD = 1 << 16  # bytes of a text by which its day is found
 
+# A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
+# distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
+_FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
+
 Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
 """The needed rows of some, given their area and the longest gap within a track [s]."""
+
+
+class LoadedFile(NamedTuple):
+    """A file that has been read.
+
+    Attributes
+    ----------
+    path : the file.
+    recipe : how it was read, with its columns.
+    rows : its usable rows: day, id, t [s], x, y [m].
+    is_named : whether its name is its day: it has no calendar.
+    stage : of its funnel.
+    """
+
+    path: Path
+    recipe: Recipe
+    rows: pl.DataFrame
+    is_named: bool
+    stage: dict[str, Any]
+
+    def with_day(self, day: Expr) -> LoadedFile:
+        """The same rows under another `day`."""
+        return self._replace(rows=self.rows.with_columns(day=day))
 
 
 def read_raw(
@@ -107,10 +133,10 @@ def _merge(
     """
     parts = [file.rows for file in files]
     if len({part.schema["day"] for part in parts}) > 1:
-        parts = [part.with_columns(col.day.cast(pl.String)) for part in parts]
+        parts = [part.with_columns(col.day.cast(String)) for part in parts]
     merged = wanted = pl.concat(parts)
     if excluded:
-        wanted = merged.filter(~col.day.cast(pl.String).is_in(excluded))
+        wanted = merged.filter(~col.day.cast(String).is_in(excluded))
     gaps = [file.recipe.max_gap for file in files]
     max_gap = None if None in gaps else max(filter(None, gaps))
     areas = {file.recipe.area for file in files}
@@ -137,12 +163,13 @@ def _merge(
         raise DataError(
             f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`"
         )
-    days = pd.Index(near["day"].unique().sort().cast(pl.String).to_list())
+    days = pd.Index(list(near["day"].unique().sort().cast(String)))
     columns = {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}
     codes = pd.Categorical.from_codes(day[order][is_first], days)
     frame = pd.DataFrame({"day": codes, **columns})
-    known = {"max_gap": max_gap, "area": area, "recipe": files[0].recipe.as_json()}
-    frame.attrs |= {k: v for k, v in known.items() if v is not None or k == "max_gap"}
+    frame.attrs |= {"max_gap": max_gap, "recipe": files[0].recipe.as_json()}
+    if area:
+        frame.attrs["area"] = area
     stages = [file.stage for file in files]
     for text in find_implausible(rows):
         warn(f"{names}: {text}")
@@ -163,13 +190,12 @@ def open_rows(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[R
 
     Of a text only `size` bytes are read.  Raises DataError where the file cannot be read.
     """
+    faults = exceptions.PolarsError, exceptions.PanicException
     with opened(path, recipe, size) as file:
-        try:
+        with explained(f"{path}: cannot be read", EXPECTED, faults=faults):
             rows = scan_streamed(file) or load_rows(
                 *open_source(file), ask=size is None
             )
-        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-            raise DataError(f"{path}: cannot be read ({error}); {EXPECTED}") from error
         yield rows
 
 
@@ -197,31 +223,27 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
     marked = table.with_columns(reason=rejection_reason(table))
     bad = marked.filter(col.reason.is_not_null())
     good = marked.filter(col.reason.is_null())
-    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     suggest = partial(suggest_reading, rows.source, recipe)
-    if bad.height:
-        _report_rejected(rows, bad, reasons, table.height, suggest)
+    reasons = _count_rejected(rows, bad, table.height, suggest)
     if good.height == 0:
         raise DataError(f"{path}: holds no row; {EXPECTED}")
     rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
     name = f"read {path.name}{rate}"
     stage = funnels.stage(name, table.height, good.height, reasons)
     check_people(rows, good, given, suggest)
-    if "day" not in good.columns:
-        dates = local_dates(good["t"], recipe)
-        day = pl.lit(file_stem(path)) if dates is None else dates
-        good = good.with_columns(day=day)
-    return LoadedFile(path, recipe, good.select("day", "id", "t", "x", "y"), stage)
+    dates = good.get_column("day", default=local_dates(good["t"], recipe))
+    day = lit(file_stem(path)) if dates is None else dates
+    good = good.select(day.alias("day"), "id", "t", "x", "y")
+    return LoadedFile(path, recipe, good, dates is None, stage)
 
 
-def _report_rejected(
-    rows: Rows,
-    bad: pl.DataFrame,
-    reasons: dict[str, int],
-    n: int,
-    suggest: Callable[[], str],
-) -> None:
-    """Warn of the `bad` ones of `n` rows, counted by reason; DataError above `Recipe.max_rejected`."""
+def _count_rejected(
+    rows: Rows, bad: pl.DataFrame, n: int, suggest: Callable[[], str]
+) -> dict[str, int]:
+    """Count and warn of the `bad` ones of `n` rows by reason; DataError above `Recipe.max_rejected`."""
+    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
+    if not reasons:
+        return reasons
     recipe, n_bad = rows.recipe, bad.height
     line, reason = bad.select("line", "reason").row(0)
     held = ""
@@ -231,7 +253,7 @@ def _report_rejected(
     most = MAX_REJECTED if recipe.max_rejected is None else recipe.max_rejected
     if n_bad <= most * n:
         _warn_rejected(f"{rows.path.name}, first at line {line}{held}", reasons)
-        return
+        return reasons
     advice = EXPECTED
     if n_bad < n:
         share = ceil(100 * n_bad / n) / 100
@@ -261,7 +283,7 @@ def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
         warn(f"{where}: rejected rows: {', '.join(counts)}")
 
 
-def select_usable(scan: pl.LazyFrame) -> pl.LazyFrame:
+def select_usable(scan: LazyFrame) -> LazyFrame:
     """The usable rows of a `scan` as in `Rows`."""
     return scan.filter(rejection_reason(scan).is_null())
 
@@ -292,16 +314,113 @@ def find_day(path: Path, recipe: Recipe) -> str | None:
     return None
 
 
-def local_dates(t: pl.Series, recipe: Recipe) -> pl.Series | None:
+def local_dates(t: Series, recipe: Recipe) -> Series | None:
     """The date of each time `t` in the time zone of the `recipe`; None where there is no calendar."""
     seconds = t.to_numpy()
     if recipe.shape.is_sequence or seconds.max(initial=0.0) < CALENDAR_BEGINS:
         return None
 
-    def dates(times: pl.Series) -> pl.Series:
+    def dates(times: Series) -> Series:
         moments = pl.from_epoch(times.floor().cast(pl.Int64))
         return moments.dt.convert_time_zone(recipe.tz or "UTC").dt.date()
 
-    first, last = dates(pl.Series([seconds.min(), seconds.max()]))
+    first, last = dates(Series([seconds.min(), seconds.max()]))
     is_one = first == last  # as a rule; several times as fast
     return pl.repeat(first, len(t), eager=True) if is_one else dates(t)
+
+
+# --- several files ------------------------------------------------------------------------------------
+
+
+def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
+    """Give different recordings among `files` another `day`, so that no person is in two of them.
+
+    Files without a calendar are recordings of their own, called by their names, unless people continue from
+    one to the other, as in pieces of one recording (not for EWAP).  Files of a calendar day are its pieces.
+    If most of the people in both of two files are in two places at once, the files are separate recordings
+    after all, with a DataWarning; if only some are, a DataError is raised.
+    """
+    sequences = [file.path for file in files if file.recipe.shape.is_sequence]
+    check_names(list(map(file_stem, sequences)))
+    names = name_recordings([file.path for file in files])
+    is_piece = [file.is_named and file.path not in sequences for file in files]
+    no_day = zip(files, is_piece, strict=True)
+    rows = [
+        file.with_day(lit("")).rows if piece else file.rows for file, piece in no_day
+    ]
+    shared, days = _find_shared_people(rows), list(names)
+    for j, k, _, n_apart, _ in shared:
+        if is_piece[j] and is_piece[k] and not n_apart:
+            days[k] = days[j]
+    found = [
+        file.with_day(lit(day)) if piece else file
+        for file, piece, day in zip(files, is_piece, days, strict=True)
+    ]
+    for j, k, n_together, n_apart, example in shared:
+        is_other = is_piece[j] and is_piece[k] and days[j] != days[k]
+        if is_other or not n_apart:
+            continue
+        where = f"{printable(files[j].path.name)} and {printable(files[k].path.name)}"
+        if n_apart <= n_together or files[k].rows.schema["day"] == String:
+            raise DataError(
+                f"{where}: person {example} is in two places at once ({n_apart} of {n_together + n_apart} "
+                "people in both files are); read these files one by one, or correct them"
+            )
+        warn(
+            f"{where}: {n_apart} people are in two places at once; read as two recordings"
+        )
+        found[k] = files[k].with_day(
+            pl.format("{} {}", col.day.cast(String), lit(names[k]))
+        )
+    return found
+
+
+def _find_shared_people(parts: Sequence[pl.DataFrame]) -> list[Any]:
+    """Pairs of the rows of files that share people.
+
+    For each: the numbers of both files, how many people continue from one to the other, how many are in two
+    places at once, and one of the latter.
+    """
+    keys = [col.day.cast(String), col("id", "t", "x", "y")]
+    rows = pl.concat(part.select(*keys, file=k) for k, part in enumerate(parts))
+    person, pair, file = ["day", "id"], ["j", "k"], col.file
+    rows = rows.filter((file.min() != file.max()).over(person))
+    rows = rows.sort(*person, "t", "file")
+    step = rows.with_columns(col("t", "x", "y").diff().over(person))
+    before = file.shift().over(person)
+    steps = step.with_columns(
+        j=pl.min_horizontal(file, before), k=pl.max_horizontal(file, before)
+    ).filter(col.j != col.k, col.t <= _SOON)
+    is_apart = (col.x**2 + col.y**2).sqrt() > _BLUR + _FASTEST * col.t
+    people = steps.group_by(*person, *pair).agg(apart=is_apart.any())
+    people = people.sort(*pair, "apart", *person)
+    n_apart, n_together = col.apart.sum(), (~col.apart).sum().alias("together")
+    pairs = people.group_by(pair, maintain_order=True)
+    return pairs.agg(n_together, n_apart, pl.last("id")).rows()
+
+
+def name_recordings(files: Sequence[Path]) -> list[str]:
+    """A name for each of `files`: without its ending, with its folder where two files have the same name."""
+    stems = [file_stem(file) for file in files]
+    names = [
+        f"{file.parent.name}-{stem}" if stems.count(stem) > 1 else stem
+        for file, stem in zip(files, stems, strict=True)
+    ]
+    return [
+        f"{n} ({names[:k].count(n) + 1})" if n in names[:k] else n
+        for k, n in enumerate(names)
+    ]
+
+
+def file_stem(path: Path) -> str:
+    """The name of file `path` without its endings."""
+    return path.name.split(".")[0]
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Raise DataError where two files of one name in `names` would become one day."""
+    if doubled := sorted({name for name in names if names.count(name) > 1}):
+        raise DataError(
+            f"several files are called {', '.join(doubled)}: their people would be mixed; "
+            "pass each file once, and rename those that are other recordings"
+        )

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..core.errors import DataError
 from ..core.files import write_file
-from ..core.input_files import read_small, reading, require
+from ..core.input_files import explained, read_small, reading, require
 
 # Which column holds each quantity: its name, the number of the field from 0, or a sum of columns in SQL.
 Columns = Mapping[str, str | int]
@@ -130,12 +130,9 @@ class Recipe:
             raise DataError("columns: both t and frame are given; expected one of them")
         is_text = isinstance(self.where, str | None)
         require(is_text, "where", self.where, "a condition in SQL, as text")
-        try:
+        unknown = f"unknown time zone {self.tz!r}"
+        with explained(unknown, "expected one like 'Asia/Tokyo'"):
             ZoneInfo(self.tz or "UTC")
-        except (KeyError, ValueError, OSError) as error:
-            raise DataError(
-                f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'"
-            ) from error
 
     @property
     def shape(self) -> Shape:
@@ -265,8 +262,7 @@ def arguments(recipe: Mapping[str, Any]) -> str:
 def advise(**recipe: Any) -> str:
     """Advice to read again with values of a `recipe`: arguments, or from a shell the whole command."""
     if command := os.environ.get(COMMAND_VARIABLE):
-        command = (
-            command if len(command) <= _LONGEST_COMMAND else "the same command with"
-        )
-        return f"try: {command} {arguments(recipe)}"
+        is_long = len(command) > _LONGEST_COMMAND
+        shown = "the same command with" if is_long else command
+        return f"try: {shown} {arguments(recipe)}"
     return "pass " + " and ".join(f"{name}={value!r}" for name, value in recipe.items())

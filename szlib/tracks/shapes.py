@@ -9,7 +9,7 @@ import json
 import sqlite3
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -22,11 +22,11 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.dataset  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import shapely
-from polars import col, selectors
+from polars import Series, col, selectors
 
 from ..core.checks import check_columns
 from ..core.errors import DataError, SzlibError, warn
-from ..core.input_files import reading
+from ..core.input_files import explained, reading
 from .recipe import SHAPES, Recipe, Shape
 from .sources import File, Source, charge, open_text
 
@@ -92,11 +92,11 @@ def open_table(table: Any, where: Path) -> Source:
         return Source(where, columns.columns, columns.to_series)
     frame = _with_points(table, where)
 
-    def column(at: int) -> pl.Series:
+    def column(at: int) -> Series:
         """A column of the table; one of mixed types as text."""
         values = frame.iloc[:, at].reset_index(drop=True)
         is_mixed = values.dtype.kind == "O"
-        return pl.Series(values.astype("string") if is_mixed else values)
+        return Series(values.astype("string") if is_mixed else values)
 
     return Source(where, list(map(str, frame.columns)), column)
 
@@ -121,28 +121,16 @@ def open_arrow(file: File) -> Source:
     """A Parquet or Feather `file`.  By pyarrow: a damaged file can make Polars abort the process."""
     is_parquet = file.head.startswith("PAR1")
     kind = "Parquet" if is_parquet else "Feather"
-
-    @contextmanager
-    def explained() -> Iterator[None]:
-        """Raise what pyarrow raises as DataError."""
-        try:
-            yield
-        except DataError:
-            raise
-        except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
-            raise DataError(
-                f"{file.path}: damaged {kind} ({error}); fetch or write the file again"
-            ) from error
-
-    with explained():
-        read = pq.read_schema if is_parquet else pa.ipc.open_file
+    what, advice = f"{file.path}: damaged {kind}", "fetch or write the file again"
+    with explained(what, advice):
+        is_parquet = kind == "Parquet"
+        read = pq.read_schema if is_parquet else lambda p: pa.ipc.open_file(p).schema
         schema = read(file.plain)
-        schema = getattr(schema, "schema", schema)
         data = pa.dataset.dataset(file.plain, schema, kind.lower())
 
-    def column(k: int) -> pl.Series:
+    def column(k: int) -> Series:
         """A column of the file."""
-        with explained():
+        with explained(what, advice):
             found = schema.field(k)
             batches = data.to_batches(columns=[found.name], batch_size=_ROWS_AT_ONCE)
             charged = _charged(batches, lambda batch: int(batch.nbytes), file.path)
@@ -167,10 +155,8 @@ def _charged(
 
 def open_json(file: File) -> Source:
     """A JSON `file`: an object a line, a list of objects, or points of GeoJSON."""
-    content, expected = (
-        file.text(),
-        "an object a line, a list of objects, or GeoJSON of points",
-    )
+    content = file.text()
+    expected = "an object a line, a list of objects, or GeoJSON of points"
     with reading(file.path, "as JSON", expected):
         if content.lstrip().startswith("["):
             rows = json.loads(content)
@@ -187,9 +173,9 @@ def open_json(file: File) -> Source:
     return open_table(texts, file.path)
 
 
-def _as_text(values: Iterable[Any]) -> pl.Series:
+def _as_text(values: Iterable[Any]) -> Series:
     texts = [None if value is None else str(value) for value in values]
-    return pl.Series(texts, dtype=pl.String)
+    return Series(texts, dtype=pl.String)
 
 
 def open_database(file: File) -> list[Source]:
@@ -203,16 +189,14 @@ def open_database(file: File) -> list[Source]:
         )
     address = f"{file.plain.absolute().as_uri()}?mode=ro&immutable=1"
 
-    def size_of(rows: list[Any]) -> int:
-        """Bytes of all values in some rows."""
-        return sum(map(sys.getsizeof, chain.from_iterable(rows)))
-
     def query(text: str) -> Iterator[Any]:
         """The rows that a query gives, as long as memory is allowed for all of them."""
         with closing(sqlite3.connect(address, uri=True)) as database:
             found = database.execute(text)
             some = iter(lambda: found.fetchmany(_VALUES_AT_ONCE), [])
-            yield from chain.from_iterable(_charged(some, size_of, path))
+            yield from chain.from_iterable(
+                _charged(some, lambda rows: sum(map(sys.getsizeof, chain(*rows))), path)
+            )
 
     def open_one(table: str) -> Source:
         """One of the tables; its values as text."""
@@ -260,8 +244,7 @@ def _parse_ewap(file: File) -> Parsed:
     rates = far.select(along * col.frame / length).to_numpy()
     median = np.median(rates) if len(rates) >= _EWAP_STEPS else 0.0
     near = [r for r in _EWAP_RATES if abs(median - r) < _EWAP_ERROR * r]
-    found = [file.recipe.frame_rate or 0.0, *near]
-    rate = next(filter(None, found), None)
+    rate = file.recipe.frame_rate or next(iter(near), None)
     if rate is None:
         raise DataError(
             f"{file.path}: the frame rate cannot be estimated from the file's velocities; pass frame_rate=15 "
@@ -309,17 +292,17 @@ def read_magni_rows(path: Path, plain: Path | None = None) -> pd.DataFrame:
     """
     with reading(path, "as CSV", "a file of THOR-MAGNI"):
         rows = pd.read_csv(plain or path)
-    check_columns(rows, list(SHAPES["magni"].header))
-    times = np.unique(rows["Time"])
-    step = np.diff(times)
-    begins = times[1:][step < _SESSION * np.median(step)] if len(step) else times[:0]
-    session = np.searchsorted(begins, rows["Time"], side="right")
-    helmet = rows["ag_id"].astype(str).str.extract(r"(\d+)$")[0]
+        check_columns(rows, list(SHAPES["magni"].header))
+        helmet = rows["ag_id"].astype(str).str.extract(r"(\d+)$")[0]
     if helmet.isna().any():
         name = rows.loc[helmet.isna(), "ag_id"].iloc[0]
         raise DataError(
             f"{path}: ag_id {name!r} ends in no number; expected one like Helmet_4"
         )
+    times = np.unique(rows["Time"])
+    step = np.diff(times)
+    begins = times[1:][step < _SESSION * np.median(step)] if len(step) else times[:0]
+    session = np.searchsorted(begins, rows["Time"], side="right")
     people = rows.rename(columns={"Time": "t", "data_label": "label"})
     people["id"] = 100 * (session + 1) + helmet.astype(int)
     return people.assign(session=session)[["t", "session", "x", "y", "label", "id"]]
@@ -342,15 +325,13 @@ def _parse_wide(file: File) -> Parsed:
 def _parse_level_x(file: File) -> Parsed:
     """The inD family: whom a track belongs to, and the frame rate, are in files beside it."""
     table, stated = pl.read_csv(file.plain, infer_schema=False), dict[str, Any]()
-    name = file.path.name
-    recording, kinds = (
-        file.path.with_name(name.replace("_tracks.", f"_{other}."))
-        for other in ("recordingMeta", "tracksMeta")
-    )
-    if recording.is_file() and recording != file.path:
+    stem, _, ending = file.path.name.partition("_tracks.")
+    recording = file.path.with_name(f"{stem}_recordingMeta.{ending}")
+    kinds = file.path.with_name(f"{stem}_tracksMeta.{ending}")
+    if recording.is_file():
         rates = pl.read_csv(recording, infer_schema=False)["frameRate"]
         stated["frame_rate"] = float(rates[0])
-    if kinds.is_file() and kinds != file.path:
+    if kinds.is_file():
         people = pl.read_csv(kinds, infer_schema=False).select("trackId", "class")
         table = table.join(people, "trackId", "left", maintain_order="left")
         stated["where"] = "class = 'pedestrian'"
@@ -359,17 +340,14 @@ def _parse_level_x(file: File) -> Parsed:
 
 def _parse_nuscenes(file: File) -> Parsed:
     """nuScenes: annotations; times, scenes and kinds are in files beside them."""
-
-    def load(name: str) -> dict[str, Any]:
-        """The objects of a file, by token."""
-        beside = replace(file, plain=file.path.with_name(name), path=Path(name))
-        expected = f"the {name} of the same version, beside {file.path.name}"
-        with reading(beside.plain, "as nuScenes", expected):
-            return {each["token"]: each for each in json.loads(beside.text())}
-
-    samples, instances, kinds = map(
-        load, ("sample.json", "instance.json", "category.json")
-    )
+    tables = []
+    for name in ("sample", "instance", "category"):
+        place = file.path.with_name(f"{name}.json")
+        expected = f"the {name}.json of the same version, beside {file.path.name}"
+        with reading(place, "as nuScenes", expected):
+            objects = json.loads(replace(file, plain=place).text())
+            tables.append({each["token"]: each for each in objects})
+    samples, instances, kinds = tables
     rows = []
     for each in json.loads(file.text()):
         sample, person = samples[each["sample_token"]], each["instance_token"]
@@ -391,12 +369,10 @@ PARSERS: dict[str, Callable[[File], Parsed]] = {
 def _load_by_pedpy(loader: str, file: File) -> Parsed:
     """The rows that function `loader` of PedPy gives, and frames a second."""
     path, recipe = file.path, file.recipe
-    try:
+    with explained(
+        f"{path}: is read by PedPy", "install it: pip install 'szlib[pedpy]'"
+    ):
         import pedpy
-    except ImportError as error:
-        raise DataError(
-            f"{path}: is read by PedPy: pip install 'szlib[pedpy]' ({error})"
-        ) from error
     given: dict[str, Any] = {}
     if loader == "txt":
         units = pedpy.TrajectoryUnit

@@ -19,11 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
-from polars import col
+from polars import Float64, Series, String, col
 
 from ..core.errors import DataError, StorageError
 from ..core.files import temporary_folder
 from ..core.input_files import (
+    explained,
     printable,
     readable_path,
     require_memory,
@@ -92,9 +93,9 @@ class Source:
 
     where: Path
     names: Sequence[str]
-    column: Callable[[int], pl.Series]
+    column: Callable[[int], Series]
     first_line: int = 1
-    ragged: pl.Series | bool = False
+    ragged: Series | bool = False
     decimal: str = "."
     head: str = ""
 
@@ -162,22 +163,20 @@ def unpack(plain: Path, path: Path, target: Path) -> None:
     Failure to read means damage, failure to write a lack of room.  The disk is never filled.
     """
     damage = EOFError, zlib.error, gzip.BadGzipFile, zipfile.BadZipFile, RuntimeError
-    try:
-        with _open_packed(plain, path) as packed, target.open("wb") as unpacked:
-            while block := packed.read(1 << 22):
-                disk = shutil.disk_usage(target.parent)
-                if disk.free < _RESERVE * disk.total:
-                    raise OSError(errno.ENOSPC, "the disk is nearly full")
-                unpacked.write(block)
-    except damage as error:
-        raise DataError(
-            f"{path}: damaged .gz or .zip ({error}); fetch the file again"
-        ) from error
-    except OSError as error:
-        raise StorageError(
-            f"{path}: no room to unpack it in {target.parent.parent} ({error.strerror or error}); make "
-            "room, or name another folder in $TMPDIR"
-        ) from error
+    full = f"{path}: no room to unpack it in {target.parent.parent}"
+    advice = "make room, or name another folder in $TMPDIR"
+    damaged = f"{path}: damaged .gz or .zip"
+    with (
+        explained(full, advice, StorageError, OSError),
+        explained(damaged, "fetch the file again", faults=damage),
+        _open_packed(plain, path) as packed,
+        target.open("wb") as unpacked,
+    ):
+        while block := packed.read(1 << 22):
+            disk = shutil.disk_usage(target.parent)
+            if disk.free < _RESERVE * disk.total:
+                raise OSError(errno.ENOSPC, "the disk is nearly full")
+            unpacked.write(block)
 
 
 def _open_packed(plain: Path, path: Path) -> Any:
@@ -240,14 +239,6 @@ def find_separator(first: str) -> str:
     return found if found in first else " "
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> Source:
     """The text table `file`: each line is a row of `n_fields`, or as many as the first.
 
@@ -257,7 +248,7 @@ def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> 
     lines = pl.read_csv(
         io.BytesIO(file.text().replace("\x1f", "?").encode()),
         has_header=False, separator="\x1f", quote_char=None,
-        schema={"line": pl.String}, raise_if_empty=False,
+        schema={"line": String}, raise_if_empty=False,
     )["line"]  # fmt: skip
     first = str(lines.first() or "").strip()
     if not first:
@@ -269,11 +260,11 @@ def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> 
     separator = find_separator(first)
     names = split_line(first, separator)
     if has_header is None:
-        has_header = not all(map(_is_number, names))
+        has_header = Series(names).cast(Float64, strict=False).has_nulls()
     rows = lines.slice(int(has_header))
     if rows.str.contains('"', literal=True).any():
         fields = [split_line(row or "", separator) for row in rows]
-        parts = pl.Series(fields, dtype=pl.List(pl.String))
+        parts = Series(fields, dtype=pl.List(String))
     elif separator == " ":
         parts = rows.str.replace_all(r"\s+", " ").str.strip_chars().str.split(" ")
     else:
@@ -297,21 +288,20 @@ def recognise(head: str, path: Path, recipe: Recipe) -> Shape:
     """The shape in the `recipe`, or else that of a file `path` whose first two lines are `head`."""
     first = head.partition("\n")[0].strip()
     fields = split_line(first, find_separator(first))
-    named = recipe.names_people
-    fitting = (
-        shape
-        for shape in SHAPES.values()
-        if not (named and "id" in shape.recipe.columns and not shape.parse)
-        and set(shape.header) <= set(fields)
-        and re.match(shape.begins, head, re.MULTILINE)
-        and re.match(shape.file, path.name)
-    )
-    shape = recipe.shape if recipe.file_format else next(fitting)
-    found = re.match(shape.begins, head, re.MULTILINE)
-    if not (found and found.groupdict()):
+    for shape in [recipe.shape] if recipe.file_format else SHAPES.values():
+        found = re.match(shape.begins, head, re.MULTILINE)
+        named = re.match(shape.file, path.name)
+        is_given = recipe.names_people and "id" in shape.recipe.columns
+        fits = set(shape.header) <= set(fields) and (shape.parse or not is_given)
+        if found and named and fits:
+            break
+    groups = found.groupdict() | named.groupdict() if found and named else {}
+    if not groups:
         return shape
-    sums = shape.recipe.columns.items()
-    columns = {k: str(v).format_map(found.groupdict()) for k, v in sums}
+    columns = {
+        name: at.format_map(groups) if isinstance(at, str) else at
+        for name, at in shape.recipe.columns.items()
+    }
     return replace(shape, recipe=replace(shape.recipe, columns=columns))
 
 
@@ -323,11 +313,11 @@ def scan_streamed(file: File) -> Rows | None:
     if not (shape.is_streamed and is_simple) or file.head.startswith(CONTAINERS):
         return None
     recipe = replace(recipe.over(shape.recipe), file_format=shape.name)
-    types: dict[Any, Any] = dict.fromkeys(recipe.columns.values(), pl.Float64)
+    types: dict[Any, Any] = dict.fromkeys(recipe.columns.values(), Float64)
     types[recipe.columns["id"]] = pl.Int64
-    schema = {f"f{k}": types.get(k, pl.String) for k in range(shape.n_fields)}
+    schema = {f"f{k}": types.get(k, String) for k in range(shape.n_fields)}
     scan = pl.scan_csv(
-        file.plain, schema={**schema, "extra": pl.String()}, has_header=False, quote_char=None,
+        file.plain, schema={**schema, "extra": String()}, has_header=False, quote_char=None,
         encoding="utf8-lossy", ignore_errors=True, truncate_ragged_lines=True, missing_columns="insert",
         extra_columns="ignore", raise_if_empty=False, glob=False, row_index_name="line", row_index_offset=1,
     )  # fmt: skip
