@@ -109,7 +109,7 @@ def find_place(
     area = settings.area
     if area is None:
         area = tracks.attrs.get("area", AUTO)
-    if isinstance(area, str) and area == AUTO:
+    if str(area) == AUTO:
         tracks = place_apart(tracks)
     return tracks, area_for(tracks, area, settings.space)
 

@@ -33,7 +33,7 @@ from scipy.sparse.csgraph import connected_components
 from ..core.errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND
-from .occupants import TrackRows, find_neighbours
+from .occupants import TrackRows, find_neighbours, spans
 
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
     "companions", "standing", "same direction", "opposite", "crossing",
@@ -155,10 +155,11 @@ def classify_motion(
 
 def _common_track(pairs: np.ndarray, rows: TrackRows) -> tuple[np.ndarray, np.ndarray]:
     """Every tick at which both people of a pair have a row: the pair's number, and the two rows."""
-    row = np.flatnonzero(np.isin(rows.person, pairs))
-    a = pd.DataFrame({"one": rows.person[row], "tick": rows.tick[row], "a": row})
-    b = a.rename(columns={"one": "other", "a": "b"})
-    both = pd.DataFrame(pairs.T, columns=["one", "other"]).reset_index(names="pair")
-    both = both.merge(a, on="one").merge(b, on=["other", "tick"])
-    both = both.sort_values(["pair", "tick"])
-    return both["pair"].to_numpy(), both[["a", "b"]].to_numpy().T
+    first, last = np.searchsorted(rows.person, [pairs[0], pairs[0] + 1])
+    pair, one = spans(first, last)
+    length = rows.moment.max(initial=0) + 1
+    key = rows.person * length + rows.moment  # ascending: rows are by person and time
+    sought = key[one] + (length * np.diff(pairs, axis=0)[0])[pair]
+    other = np.searchsorted(key, sought)
+    is_common = np.take(key, other, mode="clip") == sought
+    return pair[is_common], np.stack([one, other])[:, is_common]

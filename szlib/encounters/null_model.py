@@ -279,11 +279,12 @@ def null_pairs(
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Samples and pairs of a `shift`."""
         met = crowd.meet(r_max, _draw(seconds, minutes, rng))
-        counted = met.compared
+        kind = name_kinds(met.kind)
+        counted = np.flatnonzero(kind.isin(COMPARED))
         size = min(len(counted), -(-_STORED // shifts))
-        stored = np.sort(rng.choice(counted, size, replace=False))
-        kind, nearest = name_kinds(met.kind[counted]), met.nearest[counted]
-        every = pd.DataFrame({"encounter": counted, "kind": kind, "nearest": nearest})
+        stored = rng.choice(counted, size, replace=False)
+        every = pd.DataFrame({"encounter": counted, "kind": kind[counted]})
+        every["nearest"] = met.nearest[counted]
         return crowd.sample(tracks, met, stored, r_max), every
 
     parameters = {"moved": "streams", "seed": seed, "minutes": list(minutes)}

@@ -39,12 +39,17 @@ def find_neighbours(
     along, across = along[order], place.imag[order]
     last = np.searchsorted(along, along + reach, side="right")
     for rows in np.array_split(np.arange(len(order)), 1 + len(order) // _AT_ONCE):
-        count = last[rows] - rows - 1
-        one = np.repeat(rows, count)
-        skipped = np.repeat(last[rows] - np.cumsum(count), count)
-        other = np.arange(len(one)) + skipped
-        is_near = np.abs(across[other] - across[one]) <= reach
-        yield order[[one[is_near], other[is_near]]]
+        number, other = spans(rows + 1, last[rows])
+        one = rows[number]
+        near = np.flatnonzero(np.abs(across[other] - across[one]) <= reach)
+        yield order[np.stack([one[near], other[near]])]
+
+
+def spans(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All integers from each `first` to before its `last`: the position of these two, and the integer."""
+    n = last - first
+    position = np.repeat(np.arange(len(n)), n)
+    return position, np.arange(len(position)) + np.repeat(last - np.cumsum(n), n)
 
 
 def firsts(numbers: np.ndarray) -> np.ndarray:
@@ -107,8 +112,8 @@ class TrackRows:
     @cached_property
     def moment(self) -> np.ndarray:
         """Number of the moment, a tick of a day, of each row."""
-        tick = self.tick - self.tick.min()
-        return np.asarray(self.day * (tick.max() + 1) + tick)
+        tick = self.tick - self.tick.min(initial=2**62)
+        return np.asarray(self.day * (tick.max(initial=0) + 1) + tick)
 
     def __len__(self) -> int:
         return len(self.tick)
@@ -139,10 +144,8 @@ def find_occupants(
     for pairs in find_neighbours(rows.place[inside], rows.moment[inside], reach):
         ref, oth = inside[np.concatenate([pairs, pairs[::-1]], axis=1)]
         ref, oth = ref[ready[ref]], oth[ready[ref]]
-        seen, ahead = rows.place[oth] - rows.place[ref], rows.ahead[ref]
-        x = ahead.real * seen.real + ahead.imag * seen.imag
-        y = ahead.real * seen.imag - ahead.imag * seen.real
-        within = space.contains(x, y)
+        seen = (rows.place[oth] - rows.place[ref]) * rows.ahead[ref].conj()
+        within = space.contains(seen.real, seen.imag)
         people += np.bincount(ref[within], minlength=len(rows))
         other[ref[within]] = oth[within]
     return people, other

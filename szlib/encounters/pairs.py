@@ -124,7 +124,8 @@ class Meetings:
     nearest : nearest approach [m], (n,).
     kind : number of the kind, (n,).
     third : other people near one of the two at that moment, (n,).
-    near, of_pair : rows at every whole second at which two people may be near, (2, m), and their pair, (m,).
+    near, of_pair : rows of `Crowd.coarse` at every whole second at which two people may be near, (2, m), and
+        their pair, (m,).
     """
 
     rows: np.ndarray
@@ -133,11 +134,6 @@ class Meetings:
     third: np.ndarray
     near: np.ndarray
     of_pair: np.ndarray
-
-    @property
-    def compared(self) -> np.ndarray:
-        """Numbers of the pairs of the kinds compared."""
-        return np.flatnonzero(np.isin(self.kind, list(map(KINDS.index, COMPARED))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,12 +144,12 @@ class Crowd:
     ----------
     rows : the rows of the tracks in the area and `REACH` around it, by person and time.
     inside : whether each row is in the area.
-    coarse : one row a second of everybody in the area, or within a second of it: pairs are sought there.
+    at : numbers of one row a second of everybody in the area, or within a second of it.
     """
 
     rows: TrackRows
     inside: np.ndarray
-    coarse: np.ndarray
+    at: np.ndarray
 
     @classmethod
     def from_tracks(cls, tracks: pd.DataFrame, area: Area) -> Crowd:
@@ -169,13 +165,23 @@ class Crowd:
         day = np.unique(rows.day, return_inverse=True)[1]
         rows = replace(rows, day=day, piece=np.r_[0, np.cumsum(gaps)])
         near = rows.within(area.grown(_BEYOND))
-        coarse = np.flatnonzero(near & (rows.tick % TICKS_PER_SECOND == 0))
-        return cls(rows, rows.within(area), coarse)
+        at = np.flatnonzero(near & (rows.tick % TICKS_PER_SECOND == 0))
+        return cls(rows, rows.within(area), at)
+
+    @cached_property
+    def coarse(self) -> TrackRows:
+        """The rows `at` whole seconds: pairs are sought there."""
+        return self.rows.select(self.at)
+
+    @cached_property
+    def ways(self) -> np.ndarray:
+        """Positions from 1 s before the rows `at` to 1 s after, NaN out of the area, (n, 21)."""
+        return self._around(self.rows.place, self.at, _AROUND)
 
     @cached_property
     def unit(self) -> np.ndarray:
         """Number of the unit of each person."""
-        return find_units(self.rows, self.coarse)
+        return find_units(self.rows, self.at)
 
     @cached_property
     def stream(self) -> np.ndarray:
@@ -192,20 +198,15 @@ class Crowd:
         return np.asarray(day * SECTORS + sector[self.unit])
 
     @cached_property
-    def close(self) -> Meetings:
-        """The pairs of people within `CLOSE`, as they walked."""
-        return self.meet(CLOSE)
-
-    @cached_property
     def sensor(self) -> SensorCheck:
         """What the tracks say about the sensor."""
-        met, rows = self.close, self.rows
+        met, rows = self.meet(CLOSE), self.rows
         near = self._near_rows(met, np.flatnonzero(met.kind > 0), CLOSE)
-        found = count_ends(rows, self.inside, near[["one", "other"]].to_numpy().T)
+        found = count_ends(rows, self.inside, near[1:])
         found |= measure_noise(rows, self.inside)
         passing = met.rows[:, (met.kind > _STANDING) & (met.nearest < NEAR_END)]
-        ends, known = self._along(passing, np.array([-BEFORE, BEFORE]))
-        velocity = rows.velocity[ends[:, known.all(axis=1)]]
+        velocity = self._around(rows.velocity, passing, np.array([-BEFORE, BEFORE]))
+        velocity = velocity[:, np.isfinite(velocity).all(axis=(0, 2))]
         exchanged = count_exchanged(velocity[..., 0], velocity[..., 1])
         return SensorCheck(**found, passes=velocity.shape[1], exchanged=exchanged)
 
@@ -214,22 +215,22 @@ class Crowd:
 
         With `shifts` each stream is moved in time by its one [s], and pairs of one stream are left out.
         """
-        rows, (first, period) = self.rows.select(self.coarse), self.rows.recorded
+        rows, (first, period) = self.coarse, self.rows.recorded
         second = rows.tick // TICKS_PER_SECOND - first[rows.day]
-        group = np.arange(len(self.unit))
+        group = rows.person
         if shifts is not None:
-            group = self.stream
-            second = (second + shifts[group[rows.person]]) % period[rows.day]
+            group = self.stream[rows.person]
+            second = (second + shifts[group]) % period[rows.day]
         moment = rows.day * period.max() + second
         found = find_neighbours(rows.place, moment, r_max + _MARGIN)
         pairs = np.concatenate(list(found), axis=1)
-        pairs = pairs[:, np.diff(group[rows.person][pairs], axis=0)[0] != 0]
+        pairs = pairs[:, np.diff(group[pairs], axis=0)[0] != 0]
         # A person who has just come into the area may have been nearer almost a second ago.
         pairs = pairs[:, _likely_nearest(rows, pairs, 1.0) < r_max + _TURN]
-        near = np.sort(self.coarse[pairs], axis=0)  # rows are in the order of people
-        one, other = self.rows.person[near]
-        key = one * np.int64(len(group)) + other
-        order = np.argsort(key * len(self.rows) + near[0])
+        near = np.sort(pairs, axis=0)  # rows are in the order of people
+        one, other = rows.person[near]
+        key = one * len(self.unit) + other
+        order = np.argsort(key * len(rows) + near[0])
         near = near[:, order]
         of_pair = np.cumsum(np.diff(key[order], prepend=-1) > 0) - 1
         pairs, nearest, at = self._approach(near, of_pair)
@@ -247,53 +248,54 @@ class Crowd:
         `tracks` is the track table of the crowd.
         """
         near = self._near_rows(met, pairs, r_max)
-        samples = sample_rows(tracks, self.rows, *near.to_numpy().T)
-        samples["kind"] = name_kinds(met.kind[near["pair"]])
-        samples["third"] = met.third[near["pair"]]
+        key = near[0] * len(self.rows) + near[1]
+        near = near[:, np.unique(key, return_index=True)[1]]
+        samples = sample_rows(tracks, self.rows, *near)
+        samples["kind"] = name_kinds(met.kind[near[0]])
+        samples["third"] = met.third[near[0]]
         return samples
 
-    def _near_rows(
-        self, met: Meetings, pairs: np.ndarray, r_max: float
-    ) -> pd.DataFrame:
-        """The `pair`, and the rows `one` and `other`, where some `pairs` of `met` are within `r_max` [m]."""
-        wanted = np.isin(met.of_pair, pairs)
-        (one, other), known = self._along(met.near[:, wanted], _AROUND)
-        near = known & (self.rows.distance(one, other) < r_max)
-        pair = met.of_pair[wanted][np.nonzero(near)[0]]
-        found = pd.DataFrame({"pair": pair, "one": one[near], "other": other[near]})
-        return found.drop_duplicates().sort_values(["pair", "one"])
+    def _near_rows(self, met: Meetings, pairs: np.ndarray, r_max: float) -> np.ndarray:
+        """Where some `pairs` of `met` are within `r_max` [m]: the pair, and the two people's rows, (3, n).
 
-    def _along(
-        self, pairs: np.ndarray, steps: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of two people `steps` [ticks] after the rows `pairs` (2, n), and whether both are in the area.
-
-        Their shapes are (2, n, len(steps)) and (n, len(steps)).
+        What lies between two whole seconds is given twice.
         """
-        start, piece = pairs[..., None], self.rows.piece
-        at = np.clip(start + steps, 0, len(piece) - 1)
-        known = self.inside[at] & (piece[at] == piece[start]) & (at - start == steps)
-        return at, known.all(axis=0)
+        wanted = np.isin(met.of_pair, pairs)
+        near, of_pair = met.near[:, wanted], met.of_pair[wanted]
+        moment, step = np.nonzero(self._distances(near) < r_max)
+        both = self.at[near[:, moment]] + _AROUND[step]
+        return np.stack([of_pair[moment], *both])
+
+    def _around(
+        self, values: np.ndarray, at: np.ndarray, steps: np.ndarray
+    ) -> np.ndarray:
+        """The `values` of rows some `steps` [ticks] after those `at`; NaN out of the area, or past a gap."""
+        start, piece = at[..., None], self.rows.piece
+        around = (start + steps) % len(piece)  # past the ends there is another piece
+        known = self.inside[around] & (piece[around] == piece[start])
+        return np.where(known, values[around], np.nan)
+
+    def _distances(self, near: np.ndarray) -> np.ndarray:
+        """Distances of two people around the rows `near` of `coarse` [m], NaN out of the area, (n, 21)."""
+        return np.asarray(np.abs(np.subtract(*self.ways[near])))
 
     def _approach(
         self, near: np.ndarray, of_pair: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of each pair: its rows where it is nearest (2, n), the distance [m], and the position in `near`."""
-        rows = self.rows
-        likely = _likely_nearest(rows, near, 0.5)
-        likely += np.where(self.inside[near].all(axis=0), 0.0, 2 * REACH)
+        likely = _likely_nearest(self.coarse, near, 0.5)
+        likely[~self.inside[self.at[near]].all(axis=0)] += 2 * REACH
         least = np.minimum.reduceat(likely, firsts(of_pair))
         at = np.flatnonzero(likely == least[of_pair])
         at = at[firsts(of_pair[at])]
-        around, known = self._along(near[:, at], _AROUND)
-        distance = np.where(known, rows.distance(*around), np.inf)
-        best = np.arange(len(at)), distance.argmin(axis=1)
-        return around[:, *best], distance[best], at
+        distance = np.nan_to_num(self._distances(near[:, at]), nan=np.inf)
+        step = distance.argmin(axis=1)
+        return self.at[near[:, at]] + _AROUND[step], distance.min(axis=1), at
 
     def _kinds(self, near: np.ndarray, of_pair: np.ndarray) -> np.ndarray:
         """Number of the kind of each pair, from its rows at whole seconds."""
-        pairs = self.rows.person[near[:, firsts(of_pair)]]
-        codes = classify_motion(self.rows, near, of_pair, pairs.shape[1])
+        pairs = self.coarse.person[near[:, firsts(of_pair)]]
+        codes = classify_motion(self.coarse, near, of_pair, pairs.shape[1])
         (unit, own), (stream, other) = self.unit[pairs], self.stream[pairs]
         rules = [unit == own, (stream == other) & (codes != _STANDING)]
         names = [KINDS.index(kind) for kind in (COMPANIONS, SAME)]
@@ -303,8 +305,8 @@ class Crowd:
         self, near: np.ndarray, at: np.ndarray, r_max: float
     ) -> np.ndarray:
         """Number of other people within `r_max` [m] of one of two who are in the rows `at` of `near`."""
-        close = near[:, self.rows.distance(*near) < r_max]
-        around = np.bincount(close.ravel(), minlength=len(self.rows))
+        close = near[:, self.coarse.distance(*near) < r_max]
+        around = np.bincount(close.ravel(), minlength=len(self.coarse))
         return np.asarray(np.maximum(around[near[:, at]].max(axis=0) - 1, 0))
 
 

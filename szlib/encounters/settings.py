@@ -66,7 +66,7 @@ class EncounterSettings:
     has_walls: bool = False
 
     def __post_init__(self) -> None:
-        automatic = isinstance(self.area, str) and self.area.strip() == AUTO
+        automatic = str(self.area).strip() == AUTO
         if self.area is not None:
             object.__setattr__(self, "area", AUTO if automatic else as_area(self.area))
         duration = self.duration
@@ -98,19 +98,17 @@ class EncounterSettings:
         `square` is accepted for `area`.  Raises DataError for an unknown name, or if both are given.
         """
         known = [each.name for each in fields(self)]
-        if unknown := sorted(set(parameters) - {*known, "square"}):
+        given = {
+            "area" if name == "square" else name: value
+            for name, value in parameters.items()
+        }
+        if unknown := sorted(given.keys() - set(known)):
             raise DataError(f"unknown parameter {unknown}; expected some of {known}")
-        if {"area", "square"} <= set(parameters):
+        if len(given) < len(parameters):
             raise DataError(
                 "both area and square are given; they mean the same: give area alone"
             )
-        return replace(
-            self,
-            **{
-                "area" if name == "square" else name: v
-                for name, v in parameters.items()
-            },
-        )
+        return replace(self, **given)
 
     def as_json(self) -> dict[str, Any]:
         """Every setting as a JSON value; the area as text from which `szlib.as_area` gives it again."""

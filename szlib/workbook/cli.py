@@ -210,13 +210,15 @@ def _notebooks(options: argparse.Namespace) -> int:
 
 def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
     """How many pairs of `tracks` in an `area` are compared with chance, and what they say of the sensor."""
-    from ..encounters.pairs import CLOSE, Crowd
+    from ..encounters.kinds import name_kinds
+    from ..encounters.pairs import CLOSE, COMPARED, Crowd
 
     crowd = Crowd.from_tracks(tracks, area)
+    compared = name_kinds(crowd.meet(CLOSE).kind).isin(COMPARED)
     resolved = crowd.sensor.resolved
     loses = f"loses people who are nearer than {resolved:.1f} m to each other"
     return (
-        f"pairs who come towards each other or cross, within {CLOSE:g} m: {len(crowd.close.compared):,}\n"
+        f"pairs who come towards each other or cross, within {CLOSE:g} m: {compared.sum():,}\n"
         f"sensor: it {loses if resolved else 'resolves people at every distance'}: {crowd.sensor}"
     )
 
