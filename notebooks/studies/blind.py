@@ -6,7 +6,7 @@
 
 `tests/benchmarks/truth` judges one crowd a row. Here the rows of each kind of crowd are counted: how many have
 p <= 0.05, how many are called "usable", and how many intervals hold the truth. The rows of one file are of one
-size; its kinds of crowd are counted apart.
+size; its kinds of crowd are counted apart. Kinds of crowd that are in no file keep their rows of the table.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import sys
 
 import pandas as pd
 from studies.committed import study, write_table
+
+from szlib.workbook.record import read_table
 
 HELD = ("a", "b", "area", "center_x")
 
@@ -43,8 +45,10 @@ def count_crowds(judged: pd.DataFrame) -> pd.DataFrame:
 
 def main(files: list[str]) -> None:
     """Count the crowds in `files`, and write the table."""
-    parts = [count_crowds(pd.read_csv(file)) for file in files]
-    write_table(pd.concat(parts, ignore_index=True), "25_blind")
+    counted = pd.concat([count_crowds(pd.read_csv(file)) for file in files])
+    before = read_table("25_blind")
+    others = before[~before["crowd"].isin(counted["crowd"])]
+    write_table(pd.concat([others, counted], ignore_index=True), "25_blind")
 
 
 if __name__ == "__main__":

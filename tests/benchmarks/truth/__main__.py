@@ -64,7 +64,9 @@ def judge_zones(
         else:
             swerving(walks, rng, (a, b))
         tracks = read(as_table(walks), rng, rate=asked.rate, noise=asked.noise)
-        name = f"{'ORCA' if asked.orca else 'zone'} {a:g} x {b:g}"
+        name = f"swerve around {a:g} m x {b:g} m"
+        if asked.orca:
+            name = f"ORCA, a circle of {a:g} m"
         row = {"crowd": name, "seed": seed} | judge(tracks, lone=asked.lone)
         yield row | says_truth(row, truth)
 
@@ -79,7 +81,7 @@ def judge_plazas(_: list[str], asked: argparse.Namespace) -> Iterator[dict[str, 
         with TemporaryDirectory() as folder:
             path = szlib.make_plaza(Path(folder) / "plaza.csv", seed=seed)
             tracks = szlib.read_tracks(path)
-        row = {"crowd": "plaza", "seed": seed}
+        row = {"crowd": "default plazas", "seed": seed}
         row |= judge(tracks, lone=asked.lone, area=szlib.ATC_SQUARE)
         yield row | says_truth(row, truth)
 
