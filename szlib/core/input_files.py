@@ -229,12 +229,15 @@ def granted_memory(size: int | None) -> Iterator[None]:
 
 def require_memory(size: float, what: str) -> None:
     """Raise MemoryLimitError if `what`, the subject of the message, takes `size` bytes, above the limit."""
-    allowed = memory_limit()
-    if size > allowed:
+    if size > (allowed := memory_limit()):
         raise MemoryLimitError(
-            f"{what} takes about {size / 1e9:.1f} GB of memory, and the limit is {allowed / 1e9:.1f} GB; "
-            f"split the data by time, or raise the limit (--memory, ${MEMORY_VARIABLE}) if there is more"
+            f"{what} takes about {_readable(size)} of memory, and the limit is {_readable(allowed)}; split "
+            f"the data by time, or raise the limit (--memory, ${MEMORY_VARIABLE}) if the machine has more"
         )
+
+
+def _readable(size: float) -> str:
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
 
 
 def _available_memory() -> int:
