@@ -52,7 +52,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.checks import Array, check_array, check_vector
+from ..core.checks import Array, check_array, check_number, check_vector
 from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
@@ -181,11 +181,8 @@ class DriveStep(Step):
         return states
 
     @property
-    def path(self) -> Path:
-        """Where the disc goes within this step."""
-        dt = self.scene.settings.dt
-        bows = np.full((2, 1), abs(self.control.prod()) * dt**2 / 8)
-        return Path(self.predicted[:2, :2], np.array([0.0, dt]), *bows)
+    def _sideways(self) -> float:
+        return float(abs(self.control.prod()))
 
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, whose wheels follow the point: arcs, of complex numbers."""
@@ -260,8 +257,8 @@ class DifferentialDrive(MPCCBF):
         tracker: Tracker | None = None,
     ) -> None:
         self.robot = Unicycle()
-        self.omega_max = float(check_array("omega_max", omega_max, ()))
-        self.ahead = inf if ahead is None else float(check_array("ahead", ahead, ()))
+        self.omega_max = check_number("omega_max", omega_max)
+        self.ahead = inf if ahead is None else check_number("ahead", ahead)
         given = {"walls": walls, "obstacles": obstacles, "tracker": tracker}
         super().__init__(zone, settings=settings, **given)
 

@@ -131,6 +131,24 @@ class MPCCBF(Controller):
     -----
     DataWarning : `zone` was fitted, and its verdict at `settings.zone_speed` is not "usable".
 
+    Notes
+    -----
+    The robot always gets a control, whatever people do and whatever a sensor measures. `Step.status` tells if
+    people leave it no way, `Step.goal_blocked` if the goal cannot be reached.
+
+    Measurements of people that cannot be used are rejected and counted (`Step.rejected`); the last known
+    state of the same person, moved forward, takes their place. If nothing is known of a person
+    (`Step.unknown`), no plan can be proved safe, but a robot at rest hits nobody. So the step is not `safe`,
+    and the target is the point where full braking ends, instead of the goal. The robot still keeps out of all
+    known zones, and away from walls.
+
+    Latency: give the true times of measurement. `stamps` bring people to `now`; `state_age` brings the robot
+    there, by the controls commanded since. If a control takes effect late, by d seconds, let `now` be the
+    time at which it does, and add d to `state_age`. `Step.clock` says if the times do not fit.
+
+    With a `route`, the plan heads for its farthest point in sight, at most `settings.lookahead` ahead of
+    where the route passes the robot; the people and walls on it are avoided as always.
+
     Examples
     --------
     >>> import szlib
@@ -238,19 +256,6 @@ class MPCCBF(Controller):
     ) -> Step:
         """Decide the acceleration for the next `dt`.
 
-        The robot always gets a control, whatever people do and whatever a sensor measures. `Step.status`
-        tells if people leave it no way, `Step.goal_blocked` if the goal cannot be reached.
-
-        Measurements of people that cannot be used are rejected and counted (`Step.rejected`); the last known
-        state of the same person, moved forward, takes their place. If nothing is known of a person
-        (`Step.unknown`), no plan can be proved safe, but a robot at rest hits nobody. So the step is not
-        `safe`, and the target is the point where full braking ends, instead of the goal. The robot still
-        keeps out of all known zones, and away from walls.
-
-        Latency: give the true times of measurement. `stamps` bring people to `now`; `state_age` brings the
-        robot there, by the controls commanded since. If a control takes effect late, by d seconds, let `now`
-        be the time at which it does, and add d to `state_age`. `Step.clock` says if the times do not fit.
-
         Parameters
         ----------
         state : (x, y, vx, vy) [m, m/s]; for a `DifferentialDrive` see there.
@@ -260,16 +265,13 @@ class MPCCBF(Controller):
             `Person`s. See `Tracker`.
         stamps : when they were measured, one time for each or one for all [s]; default: now.
         now : time, by the same clock [s]; default: `dt` after the last step.
-        route : a way to the goal from a global planner, corners, shape (m, 2) [m]. The plan heads for its
-            farthest point in sight, at most `settings.lookahead` ahead of where the route passes the robot;
-            the people and walls on it are avoided as always. Default: a way of its own (`Step.ways`) if
-            `settings.lookahead` is finite, else none.
+        route : a way to the goal from a global planner, corners, shape (m, 2) [m]; default: a way of its own
+            (`Step.ways`) if `settings.lookahead` is finite, else none.
         state_age : time from the measurement of `state` to `now`, at most 1 s [s].
 
         Raises
         ------
-        SolverError : an error of the program: a number or a shape cannot be used, or the controller belongs
-            to another thread.
+        SolverError : a number or a shape cannot be used, or the controller belongs to another thread.
         """
         began = perf_counter()
         self._check_thread()
@@ -351,9 +353,8 @@ class MPCCBF(Controller):
             points = heading.ways[0].at(np.array(s.times))
             along = plan_along(s, scene.state, points)
             other = self._planner.plan(question, along)
-            is_late = other.timed_out
-            plan = min(plan, other, key=lambda each: each.rank)
-            plan = plan._replace(timed_out=is_late)
+            better = other if other.rank < plan.rank else plan
+            plan = better._replace(timed_out=other.timed_out)
         if plan.violations == (inf,):
             return "braking", plan._replace(inputs=plan_braking(s, scene.state[2:]))
         if not plan.is_relaxed:
@@ -554,15 +555,14 @@ class MPCCBF(Controller):
         """
         scene, limit = self._ask(state, goal, people), self._s.v_max
         *at, vx, vy = scene.state
-        for h, fault, place, remedy in (
-            (scene.barriers.h(*at), "the run starts in violation:", at, "start"),
-            (
-                scene.h_of_goal,
-                "the goal cannot be reached:",
-                scene.goal,
-                "choose a goal",
-            ),
-        ):
+        begins = scene.barriers.h(*at), "the run starts in violation:", at, "start"
+        ends = (
+            scene.h_of_goal,
+            "the goal cannot be reached:",
+            scene.goal,
+            "choose a goal",
+        )
+        for h, fault, place, remedy in (begins, ends):
             if (h < 0).any():
                 i = int(h.argmin())
                 raise SolverError(

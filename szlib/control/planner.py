@@ -146,16 +146,14 @@ class Program(LinearProblem):
         # inputs change by 2 a_max at most on each axis
         change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
         self.near, self.prices = (
-            np.full(len(self.lower), -inf),
-            np.zeros(len(self.lower)),
+            np.full_like(self.lower, -inf),
+            np.zeros_like(self.lower),
         )
         self.near[self.first :] = -np.minimum(change, NEAR)[k]
-        price = dict.fromkeys(Priority, 0.0) | {Priority.DECAY: s.decay_price}
-        if s.zone_price < inf:
-            price[Priority.ZONE] = s.zone_price
-        each = np.array([*price.values()]).clip(max=HARD_PRICE)[self.levels]
-        each *= np.array(s.step_lengths)[k]
-        self.prices[self.first :] = each.clip(max=HARD_PRICE)
+        zone_price = s.zone_price if s.zone_price < inf else 0.0
+        of_level = np.array([0.0, 0.0, zone_price, min(s.decay_price, HARD_PRICE)])
+        of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
+        self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
         self._is_hard = s.decay_price >= HARD_PRICE
         self._sense = np.where(self.prices > 0, _SOFT, _HARD).astype(np.intc)
         self._sense[3 * s.N : self.first] = _EQUAL

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..core.checks import Array
-from .obstacles import Group, Obstacle, Obstacles, Priority
+from .obstacles import Group, Obstacle, Obstacles, Point, Priority
 from .settings import MPCSettings
 
 
@@ -123,12 +123,16 @@ def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
 
 def plan_along(s: MPCSettings, state: Sequence[float], points: Array) -> Array:
     """Inputs with which a robot in this `state` follows `points` at the times of `s`, shape (N, 2) [m/s2]."""
-    at, v, plan = np.array(state[:2]), np.array(state[2:]), np.zeros((s.N, 2))
-    for k, length in enumerate(s.step_lengths):
+    x, y, vx, vy = state
+    plan = list[tuple[float, float]]()
+    for (px, py), length in zip(points[1:].tolist(), s.step_lengths, strict=True):
         dt = s.dt * length
-        _approach(s, plan[k], v, (points[k + 1] - at) / dt, dt, s.v_max)
-        at, v = at + dt * v + dt**2 / 2 * plan[k], v + dt * plan[k]
-    return plan
+        wanted = (px - x) / dt, (py - y) / dt
+        ax, ay = _approach(s, (vx, vy), wanted, dt, s.v_max)
+        plan.append((ax, ay))
+        x, y = x + dt * vx + dt**2 / 2 * ax, y + dt * vy + dt**2 / 2 * ay
+        vx, vy = vx + dt * ax, vy + dt * ay
+    return np.array(plan)
 
 
 def limit_speed(s: MPCSettings, velocity: Sequence[float], inputs: Array) -> None:
@@ -136,19 +140,21 @@ def limit_speed(s: MPCSettings, velocity: Sequence[float], inputs: Array) -> Non
 
     A robot that is too fast now slows down as it can.
     """
-    v, slowest = np.array(velocity), hypot(*velocity)
+    (vx, vy), slowest = velocity, hypot(*velocity)
     for control, length, time in zip(inputs, s.step_lengths, s.times[1:], strict=True):
         dt, limit = s.dt * length, max(s.v_max, slowest - s.a_max * time)
-        _approach(s, control, v, v + dt * control, dt, limit)
-        v = v + dt * control
+        ax, ay = control.tolist()
+        control[:] = _approach(s, (vx, vy), (vx + dt * ax, vy + dt * ay), dt, limit)
+        vx, vy = vx + dt * control[0], vy + dt * control[1]
 
 
 def _approach(
-    s: MPCSettings, control: Array, v: Array, wanted: Array, dt: float, limit: float
-) -> None:
-    """Set the `control` that brings a robot from `v` nearest to the `wanted` velocity, up to a `limit`."""
-    wanted = wanted * min(1.0, limit / (hypot(*wanted) or 1.0))
-    control[:] = ((wanted - v) / dt).clip(-s.a_max, s.a_max)
+    s: MPCSettings, velocity: Point, wanted: Point, dt: float, limit: float
+) -> Point:
+    """The control that brings a robot from a `velocity` nearest to the one `wanted`, up to a `limit`."""
+    share = min(1.0, limit / (hypot(*wanted) or 1.0))
+    ax, ay = ((share * w - v) / dt for v, w in zip(velocity, wanted, strict=True))
+    return max(-s.a_max, min(ax, s.a_max)), max(-s.a_max, min(ay, s.a_max))
 
 
 class Condition(NamedTuple):
@@ -241,12 +247,10 @@ def _linearise_motion(settings: MPCSettings) -> Any:
     distance, multipliers = ca.norm_2(given[4:6] - given[:2]), ca.SX.sym("speed", n)
     curved_by = ca.fmin(ca.fmax(-multipliers, 0), _MOST_CURVED)
     scale = 2 / (distance + 1 + ca.fabs(distance - 1))
-    velocity, slowed = (
-        states[2:, 1:],
-        ca.norm_2(given[2:4]) - s.a_max * horizon.times[1:],
-    )
+    velocity = states[2:, 1:]
     # a robot that is too fast slows down as it can
-    limit = ca.fmax(s.v_max, ca.DM(horizon.times[1:]) * 0 + slowed)
+    slowed = ca.norm_2(given[2:4]) - s.a_max * ca.DM(horizon.times[1:])
+    limit = ca.fmax(s.v_max, slowed)
     speed = limit**2 - ca.sum1(velocity**2).T
     curved = ca.hessian(scale * cost - ca.dot(curved_by, speed), u)[0]
     if s.terminal == "rest":
@@ -303,11 +307,8 @@ class LinearProblem:
         self.levels, self.steps = np.reshape(rows, (-1, 2)).astype(int).T
         self.first = motion.numel_out(1)
         size = self.first + len(rows)
-        self.inputs, self.given, self.multipliers = (
-            np.zeros((s.N, 2)),
-            np.zeros(8),
-            np.zeros(s.N),
-        )
+        self.inputs, self.given = np.zeros((s.N, 2)), np.zeros(8)
+        self.multipliers = np.zeros(s.N)
         self.lower, self.upper = np.zeros(size), np.full(size, 1e30)
         self.slopes, self.hessian = np.zeros((size, n)), np.zeros((n, n))
         self.gradient, self.cost = np.zeros(n), np.zeros(1)

@@ -197,8 +197,13 @@ class Step:
     def path(self) -> Path:
         """Where the disc goes within this step."""
         dt = self.scene.settings.dt
-        bow = hypot(*self.control.tolist()) * dt**2 / 8
-        return Path(self.predicted[:2, :2], np.array([0.0, dt]), *np.full((2, 1), bow))
+        bows = np.full((2, 1), self._sideways * dt**2 / 8)
+        return Path(self.predicted[:2, :2], np.array([0.0, dt]), *bows)
+
+    @property
+    def _sideways(self) -> float:
+        """Largest acceleration away from a uniform motion within this step [m/s2]."""
+        return hypot(*self.control.tolist())
 
     @property
     def way(self) -> str:
@@ -221,10 +226,8 @@ class Step:
     @property
     def residual(self) -> Array:
         """h_{k+1} - (1-gamma)^m h_k for each step of m dt of the plan, shape (obstacles, N_h) [m]."""
-        s, (x, y, *_) = (
-            self.asked.settings,
-            self.planned[: self.asked.settings.N_h + 1].T,
-        )
+        s = self.asked.settings
+        x, y, *_ = self.planned[: s.N_h + 1].T
         h = self.asked.barriers.h(x, y, np.array(s.times[: s.N_h + 1]))
         keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h], float)
         return h[:, 1:] - keep * h[:, :-1]

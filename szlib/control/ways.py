@@ -29,7 +29,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import Obstacles, Zone, ellipse_formula, find_bodies, find_places
+from .obstacles import Obstacles, ellipse_formula, find_bodies, find_places
 from .people import STANDING_SPEED
 from .settings import MPCSettings
 
@@ -153,6 +153,9 @@ class Map:
         size = np.minimum(high, last + margin) - self.corner
         self.cell = max(cell, float(sqrt(size.prod() / MOST_CELLS)))
         self.shape = tuple(np.ceil(size / self.cell).astype(int).tolist())
+        self._last = np.subtract(self.shape, 1)
+        end = self.corner + self.cell * np.array(self.shape)
+        self._box = self.corner.tolist(), end.tolist()
         self._is_thin = any(g.offsets.min() < 2 * self.cell for g in fixed.groups)
         covered = self._cover(fixed)
         self.free = ~covered | covered.all()
@@ -200,14 +203,18 @@ class Map:
 
     def holds(self, *points: Point) -> bool:
         """True if these `points` lie within the map."""
-        at = (np.array(points) - self.corner) / self.cell
-        return bool((at >= 0).all() and (at < self.shape).all())
+        low, high = self._box
+        return all(
+            first <= x < last
+            for point in points
+            for first, x, last in zip(low, point, high, strict=True)
+        )
 
     def locate(self, points: Array) -> tuple[Cells, Cells]:
         """The cells of `points`, shape (..., 2), as two indices; beyond the map the nearest one."""
-        cells = np.floor((points - self.corner) / self.cell).astype(int)
-        i, j = np.moveaxis(np.minimum(cells.clip(0), np.subtract(self.shape, 1)), -1, 0)
-        return i, j
+        cells = ((points - self.corner) / self.cell).astype(int)
+        cells = np.minimum(np.maximum(cells, 0), self._last)
+        return cells[..., 0], cells[..., 1]
 
     def find_cell(self, point: ArrayLike, among: Mask | None = None) -> tuple[int, ...]:
         """The cell of a `point`, or the nearest one that is free, or is `among` these."""
@@ -253,20 +260,20 @@ class Map:
 
         Those around the start do not count.
         """
-        longest = np.abs(ends - start).max(initial=0.0) * (1 + self._is_thin)
-        shares = np.linspace(0, 1, 2 + int(longest / self.cell))
-        offsets = shares[:, None, None] * (ends - start)
-        is_open = self._is_thin and not blocked[self.locate(start)]
-        nearest = 0.0 if is_open else 1.5 * self.cell
-        distances = np.hypot(*offsets.T).T
-        hidden = blocked[self.locate(start + offsets)] & (distances >= nearest)
+        lines = ends - start
+        longest = np.abs(lines).max(initial=0.0) * (1 + self._is_thin)
+        n = 1 + int(longest / self.cell)
+        offsets = np.arange(n + 1)[:, None, None] / n * lines
+        hidden = blocked[self.locate(start + offsets)]
+        if not self._is_thin or blocked[self.locate(start)]:
+            distances = np.hypot(*offsets.T).T
+            hidden &= distances >= 1.5 * self.cell
         return np.asarray(~hidden.any(axis=0))
 
     def list_around(self, at: Point, people: Array) -> Array:
         """Places of `people`, and those near `at` that are not free, at `_TIMES`, shape (n, k, 2) [m]."""
-        size = ceil(SEARCH_RADIUS / self.cell)
-        low = np.maximum(np.array(self.find_cell(at)) - size, 0)
-        i, j = np.array(self.find_cell(at)) + size
+        cell, size = np.array(self.find_cell(at)), ceil(SEARCH_RADIUS / self.cell)
+        low, (i, j) = np.maximum(cell - size, 0), cell + size
         fixed = np.argwhere(~self.free[low[0] : i, low[1] : j]) + low
         still = self.centers(fixed[:: 1 + len(fixed) // _PLACES])[:, None]
         return np.concatenate([people, np.repeat(still, len(_TIMES), axis=1)])
@@ -441,7 +448,8 @@ class WayFinder:
         lengths = _time(np.vstack([p, points]), 1.0)[1:]
         n = int(np.searchsorted(lengths, min(lookahead, _FARTHEST)))
         n = max(n, min(2, len(points)))  # the next cell of a large map may be farther
-        choice = np.unique(np.r_[min(1, n - 1) : min(8, n), 8:n:3, n - 1])
+        chosen = {*range(min(1, n - 1), min(8, n)), *range(8, n, 3), n - 1}
+        choice = np.array(sorted(chosen))
         seen = choice[m.sees(p, points[choice], blocked)]
         around = int(np.searchsorted(lengths, 3 * m.cell))  # a corner, close by
         if around < len(points) and blocked[m.locate(points[around])]:
@@ -502,19 +510,20 @@ class Stamps:
             px, py = at.T[..., None, None]
             d = kind.distance(px + x, py + y, 0.0, *numbers.T[..., None, None])
             prices[d < offsets[:, None, None]] = price
-        i, j = np.triu_indices(zones.size, 1)
-        apart = np.hypot(*(at[i] - at[j]).T)
-        differ = np.hypot(*(velocity[i] - velocity[j]).T)
-        is_named = np.array([each is not None for each in groups])
-        pairs = combinations(groups, 2)  # in the order of `i` and `j`
-        is_same = [one == other for one, other in pairs]
-        together = np.where(
-            is_named[i] & is_named[j],
-            np.array(is_same, bool) & (apart < _GROUP_REACH),
-            (apart < GROUP_DISTANCE) & (differ < GROUP_SPEED),
-        )
-        self._pairs = i[together], j[together]
-        between = np.hypot(x, y) < apart[together, None, None] / 2
+
+        def are_together(i: int, j: int) -> bool:
+            apart = dist(at[i], at[j])
+            if None not in (groups[i], groups[j]):
+                return groups[i] == groups[j] and apart < _GROUP_REACH
+            is_alike = dist(velocity[i], velocity[j]) < GROUP_SPEED
+            return apart < GROUP_DISTANCE and is_alike
+
+        pairs = [
+            pair for pair in combinations(range(zones.size), 2) if are_together(*pair)
+        ]
+        self._pairs = i, j = np.reshape(pairs, (-1, 2)).astype(int).T
+        apart = np.hypot(*(at[i] - at[j]).T)[:, None, None]
+        between = np.hypot(x, y) < apart / 2
         found = np.concatenate([prices, GROUP_SECOND * between])
         self._prices = found.astype(np.float32)
 
@@ -697,7 +706,7 @@ def _turn_aside(
     # complex numbers: the conjugate of u times v has the angle from u to v
     way, semi_axis = end - at, zone[4] + s.r_robot + s.eps  # of the set h < 0
     a, b = complex(*zone[:2]) - at, complex(*zone[2:4]) - at
-    is_on_goal = Zone.distance(end.real, end.imag, 0.0, *zone) < s.r_robot + s.eps
+    is_on_goal = ellipse_formula(end.real, end.imag, *zone[:5]) < s.r_robot + s.eps
     if not a * b or (is_on_goal and hypot(*zone[7:9]) < STANDING_SPEED):
         return 1.0
     cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
