@@ -58,7 +58,7 @@ class LoadedFile(NamedTuple):
     path : the file.
     recipe : how it was read, with its columns.
     rows : its usable rows: day, id, t [s], x, y [m].
-    is_named : whether its name is its day: it has no calendar.
+    is_named : whether its name is its day: it has no calendar, and can be a piece of a recording.
     stage : of its funnel.
     """
 
@@ -68,8 +68,9 @@ class LoadedFile(NamedTuple):
     is_named: bool
     stage: dict[str, Any]
 
-    def with_day(self, day: Expr) -> LoadedFile:
+    def with_day(self, day: str | Expr) -> LoadedFile:
         """The same rows under another `day`."""
+        day = lit(day) if isinstance(day, str) else day
         return self._replace(rows=self.rows.with_columns(day=day))
 
 
@@ -234,7 +235,8 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
     dates = good.get_column("day", default=local_dates(good["t"], recipe))
     day = lit(file_stem(path)) if dates is None else dates
     good = good.select(day.alias("day"), "id", "t", "x", "y")
-    return LoadedFile(path, recipe, good, dates is None, stage)
+    is_named = dates is None and not recipe.shape.is_sequence
+    return LoadedFile(path, recipe, good, is_named, stage)
 
 
 def _count_rejected(
@@ -343,21 +345,15 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     sequences = [file.path for file in files if file.recipe.shape.is_sequence]
     check_names(list(map(file_stem, sequences)))
     names = name_recordings([file.path for file in files])
-    is_piece = [file.is_named and file.path not in sequences for file in files]
-    no_day = zip(files, is_piece, strict=True)
-    rows = [
-        file.with_day(lit("")).rows if piece else file.rows for file, piece in no_day
-    ]
-    shared, days = _find_shared_people(rows), list(names)
+    days = list(names)
+    undated = [file.with_day("") if file.is_named else file for file in files]
+    shared = _find_shared_people([file.rows for file in undated])
     for j, k, _, n_apart, _ in shared:
-        if is_piece[j] and is_piece[k] and not n_apart:
+        if files[j].is_named and files[k].is_named and not n_apart:
             days[k] = days[j]
-    found = [
-        file.with_day(lit(day)) if piece else file
-        for file, piece, day in zip(files, is_piece, days, strict=True)
-    ]
+    found = [f.with_day(days[k]) if f.is_named else f for k, f in enumerate(files)]
     for j, k, n_together, n_apart, example in shared:
-        is_other = is_piece[j] and is_piece[k] and days[j] != days[k]
+        is_other = files[j].is_named and files[k].is_named and days[j] != days[k]
         if is_other or not n_apart:
             continue
         where = f"{printable(files[j].path.name)} and {printable(files[k].path.name)}"
@@ -369,9 +365,8 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
         warn(
             f"{where}: {n_apart} people are in two places at once; read as two recordings"
         )
-        found[k] = files[k].with_day(
-            pl.format("{} {}", col.day.cast(String), lit(names[k]))
-        )
+        day = pl.format("{} {}", col.day.cast(String), lit(names[k]))
+        found[k] = files[k].with_day(day)
     return found
 
 

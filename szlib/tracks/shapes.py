@@ -119,13 +119,12 @@ def _with_points(table: pd.DataFrame, where: Path) -> pd.DataFrame:
 
 def open_arrow(file: File) -> Source:
     """A Parquet or Feather `file`.  By pyarrow: a damaged file can make Polars abort the process."""
-    is_parquet = file.head.startswith("PAR1")
-    kind = "Parquet" if is_parquet else "Feather"
+    kind = "Parquet" if file.head.startswith("PAR1") else "Feather"
     what, advice = f"{file.path}: damaged {kind}", "fetch or write the file again"
     with explained(what, advice):
         is_parquet = kind == "Parquet"
-        read = pq.read_schema if is_parquet else lambda p: pa.ipc.open_file(p).schema
-        schema = read(file.plain)
+        opened = (pq.ParquetFile if is_parquet else pa.ipc.open_file)(file.plain)
+        schema = opened.schema_arrow if is_parquet else opened.schema
         data = pa.dataset.dataset(file.plain, schema, kind.lower())
 
     def column(k: int) -> Series:
