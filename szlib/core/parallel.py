@@ -75,12 +75,13 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
 @contextmanager
 def safe_path() -> Iterator[None]:
     """Start processes inside a with block that import nothing from the current folder."""
-    before = os.environ.get("PYTHONSAFEPATH", "")  # empty: not set
+    is_set = bool(os.environ.get("PYTHONSAFEPATH"))
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
         yield
     finally:
-        os.environ["PYTHONSAFEPATH"] = before
+        if not is_set:
+            os.environ.pop("PYTHONSAFEPATH", None)
 
 
 @contextmanager

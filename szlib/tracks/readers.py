@@ -323,6 +323,7 @@ def local_dates(t: Series, recipe: Recipe) -> Series | None:
         return None
 
     def dates(times: Series) -> Series:
+        """The date of each of some times."""
         moments = pl.from_epoch(times.floor().cast(pl.Int64))
         return moments.dt.convert_time_zone(recipe.tz or "UTC").dt.date()
 

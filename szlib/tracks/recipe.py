@@ -197,7 +197,21 @@ def _require_known(where: str, names: Collection[str], known: Sequence[str]) -> 
 
 @dataclass(frozen=True)
 class Shape:
-    """A kind of files: an entry of `shapes.toml`, which explains the attributes.
+    """A kind of files: an entry of `shapes.toml`.
+
+    Attributes
+    ----------
+    name : of the shape.
+    recipe : how it is read; values that users give are taken before.
+    begins : regular expression for the first two lines; its named groups stand in braces in columns.
+    file : regular expression for the name of the file; its named groups as well.
+    header : names that are in its header.
+    n_fields : number of fields of a row without header.
+    has_header : whether the first line names the columns; None looks at it.
+    parse : what makes a table of the file: a name in `shapes.PARSERS`, or of a loader of PedPy.
+    is_sequence : whether each file is a recording of its own, without a calendar.
+    is_streamed : whether files are too large to be read as a whole.
+    is_sure : whether units and columns cannot be others.
 
     Examples
     --------

@@ -131,7 +131,7 @@ def is_table(source: object) -> bool:
 
 @contextmanager
 def opened(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[File]:
-    """Open the file `path`, unpacked where it is packed; the attributes are those of `File`.
+    """Open the file `path`, unpacked where it is packed; `recipe` and `size` are those of `File`.
 
     Raises DataError where it is no regular file, cannot be opened, changes, or packs several files;
     StorageError where there is no room.
