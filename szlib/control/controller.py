@@ -75,18 +75,19 @@ def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -
     """
     now, dt = np.array(state), s.dt
     after = advance(now, control, dt)
-    way, velocity = after[:2] - now[:2], after[2:]
+    (x, y), velocity = after[:2] - now[:2], after[2:]
     fastest = float(np.abs(velocity).max())
-    steps = ceil(fastest / s.a_max / dt)
-    piece = dt * max(1, ceil(steps / _MOST_PIECES))
-    times = piece * np.arange(ceil(fastest / s.a_max / piece) + 1)
+    stop = fastest / s.a_max
+    piece = dt * max(1, ceil(ceil(stop / dt) / _MOST_PIECES))
+    times = piece * np.arange(ceil(stop / piece) + 1)
     speeds = (fastest - s.a_max * times).clip(0.0)
     gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / (fastest or 1.0)
     points = np.vstack([now[:2], after[:2], after[:2] + gone[:, None] * velocity])
     bows = np.full(len(gone) + 1, 2**0.5 * s.a_max * piece**2 / 8)
     bows[0] = hypot(*control) * dt**2 / 8
-    sideways = abs(way[0] * control[1] - way[1] * control[0]) / (hypot(*way) or 1.0)
-    asides = np.append(sideways * dt**2 / 8, np.zeros(len(gone)))
+    asides = np.zeros_like(bows)
+    sideways = abs(x * control[1] - y * control[0]) / (hypot(x, y) or 1.0)
+    asides[0] = sideways * dt**2 / 8
     return Path(points, np.append(0.0, dt + times), bows, asides)
 
 
@@ -317,8 +318,8 @@ class StepClock:
         periods, dt = self._periods, self._dt
         if len(periods) < RATE_STEPS or abs(periods[-1] - dt) <= RATE_ERROR * dt:
             return False
-        low, high = (share * dt for share in REAL_TIME)
-        if self._is_timed and not low <= periods[-1] <= high:
+        low, high = REAL_TIME
+        if self._is_timed and not low * dt <= periods[-1] <= high * dt:
             return False
         off = [each for each in periods if abs(each - dt) > RATE_ERROR * dt]
         if not self._is_timed:

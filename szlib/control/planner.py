@@ -145,10 +145,8 @@ class Program(LinearProblem):
         s, k, times = settings, self.steps, np.array(settings.times)
         # inputs change by 2 a_max at most on each axis
         change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
-        self.near, self.prices = (
-            np.full_like(self.lower, -inf),
-            np.zeros_like(self.lower),
-        )
+        self.near = np.full_like(self.lower, -inf)
+        self.prices = np.zeros_like(self.lower)
         self.near[self.first :] = -np.minimum(change, NEAR)[k]
         zone_price = s.zone_price if s.zone_price < inf else 0.0
         of_level = np.array([0.0, 0.0, zone_price, min(s.decay_price, HARD_PRICE)])
@@ -188,7 +186,7 @@ class Program(LinearProblem):
         """
         weights, slopes = prices[rows], self.slopes[rows][len(self.gradient) :]
         given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
-        size = rows is _EVERY or (len(weights), np.count_nonzero(weights))
+        size = None if rows is _EVERY else (len(weights), np.count_nonzero(weights))
         model = self._models.pop(size, None)
         if model is None:
             model = daqp.Model()
@@ -197,7 +195,7 @@ class Program(LinearProblem):
             model.soft_weights(w_l=weights, w_u=weights)
         else:
             flag = model.update(*given, sense[rows])
-            if size is not True:
+            if size:  # all rows together always have the same prices
                 model.soft_weights(w_l=weights, w_u=weights)
         if flag < 0:
             return None

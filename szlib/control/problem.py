@@ -366,9 +366,8 @@ _IPOPT = {
     "fast_step_computation": "yes",
     "min_refinement_steps": 0,
 }
-_CALL_LOCK = (
-    Lock()
-)  # one thread calls IPOPT at a time: it keeps its iterations in memory of its own
+# One thread calls IPOPT at a time: it keeps its iterations in memory of its own.
+_CALL_LOCK = Lock()
 
 
 def solve_by_ipopt(

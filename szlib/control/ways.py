@@ -496,7 +496,7 @@ class Stamps:
         if not zones.groups:
             return
         own, bodies = zones.groups[0], find_bodies(zones, s).groups[0]
-        at, velocity = own.numbers[:, 5:7], own.numbers[:, 7:9]
+        at, velocities = own.numbers[:, 5:7], own.numbers[:, 7:9].tolist()
         foci = np.abs(own.numbers[:, :4] - np.tile(at, 2)).max()
         reach = foci + float((own.numbers[:, 4] + own.offsets).max())
         reach = max(reach, BODY_RADIUS + float(bodies.offsets.max()))
@@ -510,12 +510,13 @@ class Stamps:
             px, py = at.T[..., None, None]
             d = kind.distance(px + x, py + y, 0.0, *numbers.T[..., None, None])
             prices[d < offsets[:, None, None]] = price
+        places = at.tolist()
 
         def are_together(i: int, j: int) -> bool:
-            apart = dist(at[i], at[j])
+            apart = dist(places[i], places[j])
             if None not in (groups[i], groups[j]):
                 return groups[i] == groups[j] and apart < _GROUP_REACH
-            is_alike = dist(velocity[i], velocity[j]) < GROUP_SPEED
+            is_alike = dist(velocities[i], velocities[j]) < GROUP_SPEED
             return apart < GROUP_DISTANCE and is_alike
 
         pairs = [
@@ -546,10 +547,13 @@ class Stamps:
         n = self._prices.shape[1] if len(rows) else 1
         prices = np.zeros((len(times), *(size + 2 * n for size in shape)), np.float32)
         cells = np.floor((self.find_places(times) - corner) / self._cell).astype(int)
-        first = (cells - n // 2 + n).clip(0, np.add(shape, n))
+        first = cells - n // 2 + n
+        is_inside = np.all((first > 0) & (first < np.add(shape, n)), axis=-1)
         for row in rows:
-            for layer, (i, j) in zip(prices, first[row].tolist(), strict=True):
-                part = layer[i : i + n, j : j + n]
+            (inside,) = is_inside[row].nonzero()
+            corners = first[row, inside].tolist()
+            for k, (i, j) in zip(inside.tolist(), corners, strict=True):
+                part = prices[k, i : i + n, j : j + n]
                 np.maximum(part, self._prices[row], out=part)
         return np.asarray(prices[:, n:-n, n:-n], float)
 
