@@ -32,8 +32,8 @@ PATHS = "zones/smoothing.py", "_DEGREE = 2  #", "_DEGREE = 1  #"
 LEVEL = "zones/uncertainty.py", "LEVEL = 0.95  #", "LEVEL = 0.8  #"
 RESPECT = (
     "zones/respect_test.py",
-    "radius=round(float(radius.flat[best]), 2)",
-    "radius=0.9 * float(radius.flat[best])",
+    "at, most = every.flat[best], every",
+    "at, most = 0.9 * every.flat[best], every",
 )
 STANDING = "../notebooks/studies/quality.py", "\nSTANDING = 0.1\n", "\nSTANDING = 0.2\n"
 DEFAULT = {"03": HULL, "24": STANDING, "06": RESPECT, "25": PATHS}
