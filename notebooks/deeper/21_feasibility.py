@@ -599,7 +599,7 @@ record.claim("with one person and N_h = 2, h >= 0 in every world, for any gamma"
 record.key |= {"worlds driven": int(thousands["worlds"].sum())}
 
 # %% [markdown]
-# Each world has a seed: `szlib.simulation.monte_carlo.replay(seed, settings=..., worlds=...)` shows it again. The
+# Each world has a seed: `szlib.RolloutSetup(settings=..., worlds=...).run(seed)` drives through it again. The
 # first ones of this run in which the robot did not arrive:
 
 # %% jupyter={"source_hidden": true}

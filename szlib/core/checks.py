@@ -64,6 +64,7 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     ------
     SolverError : another shape, not numbers, not finite, or beyond +-`LARGEST`.
     """
+    # NumPy refuses rows of several lengths: then this text stays, which is refused as no number.
     array = np.array("rows of several lengths")
     with suppress(ValueError):
         array = np.asarray(value)

@@ -25,15 +25,15 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from .errors import StorageError
-from .input_files import explained, open_regular, read_json_object, read_small
+from .input_files import explain_errors, open_regular, read_json_object, read_small
 
 MARKER = ".szlib"  # name of the file that marks a folder as szlib's
 _LOCK, _UNFINISHED, _TEMPORARY = ".szlib-lock", ".szlib-part-", "szlib-"
 # age at which an unfinished file is removed [s]: no write takes so long
 _ABANDONED = 3600.0
-# File systems that do not sync folders, and systems that do not open them, give these errors.
-_NOT_SYNCED = (None, errno.EINVAL, errno.EACCES)
-_explained = partial(explained, error=StorageError, faults=OSError)
+# Errors of file systems that cannot sync folders, and of operating systems that cannot open them.
+_SYNC_ERRORS = (None, errno.EINVAL, errno.EACCES)
+_explain_errors = partial(explain_errors, error=StorageError, faults=OSError)
 
 
 def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) -> None:
@@ -45,14 +45,14 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
     path, data = Path(path), content.encode() if isinstance(content, str) else content
     unfinished = path.with_name(f"{_UNFINISHED}{uuid.uuid4().hex}")
     advice = "make room, or choose a folder that is writable; files that were finished before are intact"
-    with _explained(f"{path}: cannot be written", advice):
+    with _explain_errors(f"{path}: cannot be written", advice):
         try:
             _fill(unfinished, data, durable)
             unfinished.replace(path)
             if durable:
                 _sync(path.parent)
         finally:
-            with suppress(OSError):  # where it has its name, or was never made
+            with suppress(OSError):  # it has been renamed, or was never made
                 unfinished.unlink()
 
 
@@ -65,14 +65,14 @@ def _fill(unfinished: Path, content: bytes, durable: bool) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Make the names in a folder durable."""
+    """Make the names of files in a folder durable."""
     try:
         with ExitStack() as stack:
             handle = os.open(folder, os.O_RDONLY)
             stack.callback(os.close, handle)
             os.fsync(handle)
     except OSError as error:
-        if error.errno not in _NOT_SYNCED:
+        if error.errno not in _SYNC_ERRORS:
             raise
 
 
@@ -118,7 +118,7 @@ def claim_folder(
     StorageError : the folder is refused, or cannot be made or read.
     """
     folder = Path(folder)
-    with _explained(f"{folder}: cannot be made or read", "choose another folder"):
+    with _explain_errors(f"{folder}: cannot be made or read", "choose another folder"):
         place = folder.resolve()
         if inside := [file for file in inputs if place in file.resolve().parents]:
             raise StorageError(
@@ -167,8 +167,8 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
     lock = FileLock(Path(folder) / f"{_LOCK}-run", timeout=0)
     busy = f"{folder}: another process is writing there"
     with (
-        _explained(f"{folder}: cannot be written", "choose another folder"),
-        _explained(
+        _explain_errors(f"{folder}: cannot be written", "choose another folder"),
+        _explain_errors(
             busy, "wait until it ends, or choose another folder", faults=Timeout
         ),
     ):
@@ -181,15 +181,15 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A temporary folder, removed at the end; a later call removes it where this process is killed.
+    """A temporary folder, removed at the end of the block, or by a later call if this process is killed.
 
-    A lock beside it says that its process lives, also if that runs in another container.
+    A locked file beside it shows that its process lives, even if that runs in another container.
     Raises StorageError where there is no room for it, or the umask forbids its use.
     """
     remove_abandoned_temporary()
     with ExitStack() as stack:
         advice = "make room, or name another one in $TMPDIR"
-        with _explained("no temporary folder", advice):
+        with _explain_errors("no temporary folder", advice):
             home = Path(tempfile.gettempdir()).resolve(strict=True)
             folder = home / f"{_TEMPORARY}{os.getpid()}-{uuid.uuid4().hex}"
             lock = FileLock(f"{folder}{_LOCK}")

@@ -1,4 +1,4 @@
-"""What users give: values of the right kind, regular files that do not change, and the memory that they need.
+"""What users give: argument values, files that must not change while they are read, and the memory limit.
 
 Before a table is made, its rows are counted and its size is estimated. A table above the limit raises an
 error, so that the machine does not run out of memory. The limit is the amount granted, or four fifths of the
@@ -33,14 +33,15 @@ from .errors import DataError, MemoryLimitError, SzlibError
 _TICK = 0.004  # two changes of a file within this time [s] can have the same time stamp (Linux)
 # Zero-width letters of Persian, Hindi and emoji, which Python calls not printable.
 _JOINERS = "\u200c\u200d"
+# what differs after a file has changed
 _STATE = attrgetter("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
 # The files that `unchanged_files` keeps open, by path.
-_OPEN: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
+_OPEN_FILES: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
 
 # Environment variable: the limit of each process, such as 4GB; ``--memory`` of the command line sets it.
 MEMORY_VARIABLE = "SZLIB_MEMORY"
-_SHARE = 0.8
-_granted: ContextVar[int | None] = ContextVar("granted", default=None)
+_SHARE = 0.8  # share of the available memory that may be used
+_GRANTED_SIZE: ContextVar[int | None] = ContextVar("granted", default=None)
 
 
 def require(
@@ -68,15 +69,15 @@ def require(
 
 
 @contextmanager
-def explained(
+def explain_errors(
     what: str,
     advice: str,
     error: type[SzlibError] = DataError,
     faults: type[BaseException] | tuple[type[BaseException], ...] = Exception,
 ) -> Iterator[None]:
-    """Raise `faults` in a with block as `error`: `what` failed, the reason, and `advice`.
+    """Replace errors of the classes `faults` in a with block by an `error` that says more.
 
-    Too little memory stays what it is.
+    Its message states `what` failed, the reason, and `advice`.  A MemoryLimitError is not replaced.
     """
     try:
         yield
@@ -100,7 +101,7 @@ def reading(
     error : class of the error.
     """
     shown = f"{printable(path)}: cannot be read {what}"
-    return explained(shown, f"expected {expected}", error)
+    return explain_errors(shown, f"expected {expected}", error)
 
 
 def open_regular(path: Path) -> BinaryIO:
@@ -134,21 +135,23 @@ def read_json_object(path: Path) -> dict[str, Any]:
 def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
     """Keep the files `paths` open while the block reads them at their `readable_path`.
 
-    Each is opened once, so that checksums and rows are of the same bytes.  Blocks inside this one use its
-    descriptors.  Raises DataError where a file cannot be opened, or has changed when the block ends.
+    Each is opened once, so that checksums and rows are of the same bytes.  A block inside this one uses
+    the same open files.  Raises DataError where a file cannot be opened, or has changed when the block ends.
     """
     with ExitStack() as stack:
         opened = {}
-        for path in set(paths) - _OPEN.get({}).keys():
+        for path in set(paths) - _OPEN_FILES.get({}).keys():
             what = f"{printable(path)}: cannot be opened"
-            with explained(what, "expected a file that may be read", faults=OSError):
+            with explain_errors(
+                what, "expected a file that may be read", faults=OSError
+            ):
                 opened[path] = stack.enter_context(open_regular(path))
         before = {path: _states(path, stream) for path, stream in opened.items()}
-        token = _OPEN.set({**_OPEN.get({}), **opened})
+        token = _OPEN_FILES.set({**_OPEN_FILES.get({}), **opened})
         try:
             yield
         finally:
-            _OPEN.reset(token)
+            _OPEN_FILES.reset(token)
             for path, stream in opened.items():
                 if _states(path, stream) != before[path]:
                     raise DataError(
@@ -162,7 +165,7 @@ def readable_path(path: Path) -> Path:
     Systems without /proc have no such path. There `unchanged_files` finds a file that was replaced, but not a
     folder that was exchanged for another one and put back while its files were read.
     """
-    stream = _OPEN.get({}).get(path)
+    stream = _OPEN_FILES.get({}).get(path)
     place = Path(f"/proc/self/fd/{stream.fileno()}") if stream else path
     return place if place.exists() else path
 
@@ -214,34 +217,34 @@ def parse_size(text: str) -> int:
 def memory_limit() -> int:
     """Bytes that this process may use in total."""
     text = os.environ.get(MEMORY_VARIABLE)
-    return _granted.get() or (parse_size(text) if text else _available_memory())
+    return _GRANTED_SIZE.get() or (parse_size(text) if text else _available_memory())
 
 
 @contextmanager
 def granted_memory(size: int | None) -> Iterator[None]:
     """Set the limit to `size` bytes inside a with block; None changes nothing."""
-    token = _granted.set(size or _granted.get())
+    token = _GRANTED_SIZE.set(size or _GRANTED_SIZE.get())
     try:
         yield
     finally:
-        _granted.reset(token)
+        _GRANTED_SIZE.reset(token)
 
 
 def require_memory(size: float, what: str) -> None:
-    """Raise MemoryLimitError if `what`, the subject of the message, takes `size` bytes, above the limit."""
+    """Raise MemoryLimitError if `size` bytes are above the limit; `what` takes them, as the message says."""
     if size > (allowed := memory_limit()):
         raise MemoryLimitError(
-            f"{what} takes about {_readable(size)} of memory, and the limit is {_readable(allowed)}; split "
+            f"{what} takes about {_show_size(size)} of memory, and the limit is {_show_size(allowed)}; split "
             f"the data by time, or raise the limit (--memory, ${MEMORY_VARIABLE}) if the machine has more"
         )
 
 
-def _readable(size: float) -> str:
+def _show_size(size: float) -> str:
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
 
 
 def _available_memory() -> int:
-    """Four fifths of the bytes available without swapping; in a Linux container, of its limit (cgroup 2)."""
+    """Four fifths of the bytes free without swapping, or of those left to a Linux container (cgroup 2)."""
     available, group = psutil.virtual_memory().available, "/sys/fs/cgroup/memory"
     with suppress(OSError, ValueError):  # "max": no limit
         allowed = float(Path(f"{group}.max").read_text())

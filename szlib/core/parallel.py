@@ -22,7 +22,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from .errors import SzlibError
 from .files import process_folder
-from .input_files import explained, granted_memory, memory_limit
+from .input_files import explain_errors, granted_memory, memory_limit
 
 # longest wait for the answer of a scheduler, and for its first worker [s]
 _CONNECT_TIMEOUT = 10.0
@@ -162,16 +162,16 @@ def cluster(address: str | None, *, wait: float = _CONNECT_TIMEOUT) -> Iterator[
         yield None
         return
     advice = "install it with: pip install -e '.[cluster]'"
-    with explained("a scheduler needs Dask", advice, SzlibError, ImportError):
+    with explain_errors("a scheduler needs Dask", advice, SzlibError, ImportError):
         from distributed import Client
-    with explained(
+    with explain_errors(
         f"no Dask scheduler answers at {address!r}",
         "start one with `dask scheduler`, and give its address, such as tcp://10.0.0.1:8786",
         SzlibError,
     ):
         client = Client(address, timeout=max(wait, _CONNECT_TIMEOUT))
     with client:
-        with explained(
+        with explain_errors(
             f"no worker joined the scheduler at {address!r} within {wait:g} s",
             f"start one with `dask worker {address}`, or wait longer, such as --wait 600",
             SzlibError,

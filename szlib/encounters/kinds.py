@@ -100,7 +100,7 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
 def find_units(rows: TrackRows, whole: np.ndarray) -> np.ndarray:
     """Number of the unit of each person: companions, and companions of companions.
 
-    `whole` are those of the `rows` at whole seconds at which companions are sought.
+    `whole` are the numbers of the `rows` at whole seconds, among which companions are sought.
     """
     found = find_neighbours(rows.place[whole], rows.moment[whole], NEAR)
     pairs = np.sort(rows.person[whole][np.concatenate(list(found), axis=1)], axis=0)

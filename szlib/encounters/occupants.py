@@ -46,7 +46,10 @@ def find_neighbours(
 
 
 def spans(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All integers from each `first` to before its `last`: the position of these two, and the integer."""
+    """List the integers of ranges, from each `first` up to the one before its `last`.
+
+    Returns, of each integer, the number of its range, and the integer.
+    """
     n = last - first
     position = np.repeat(np.arange(len(n)), n)
     return position, np.arange(len(position)) + np.repeat(last - np.cumsum(n), n)

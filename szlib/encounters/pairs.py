@@ -65,7 +65,7 @@ _OFFSETS = np.radians(np.arange(0, 45, 5))  # of the borders of the sectors
 _MARGIN = 1.75  # way that two people close in half a second, at 3.5 m/s [m]
 _TURN = 0.5  # by which two people who turn come nearer within a second [m]
 # Steps of the clock around each whole second at which two people are measured.
-_AROUND = np.arange(-TICKS_PER_SECOND, TICKS_PER_SECOND + 1)
+_STEPS = np.arange(-TICKS_PER_SECOND, TICKS_PER_SECOND + 1)
 # People this far outside of the area may be in it at the next whole second [m].
 _BEYOND = 1.6
 
@@ -124,8 +124,8 @@ class Meetings:
     nearest : nearest approach [m], (n,).
     kind : number of the kind, (n,).
     third : other people near one of the two at that moment, (n,).
-    near, of_pair : rows of `Crowd.coarse` at every whole second at which two people may be near, (2, m), and
-        their pair, (m,).
+    near, of_pair : rows of `Crowd.coarse_rows` at every whole second at which two people may be near, (2, m),
+        and their pair, (m,).
     """
 
     rows: np.ndarray
@@ -144,12 +144,12 @@ class Crowd:
     ----------
     rows : the rows of the tracks in the area and `REACH` around it, by person and time.
     inside : whether each row is in the area.
-    at : numbers of one row a second of everybody in the area, or within a second of it.
+    whole_seconds : numbers of the rows at whole seconds of people in the area, or within a second of it.
     """
 
     rows: TrackRows
     inside: np.ndarray
-    at: np.ndarray
+    whole_seconds: np.ndarray
 
     @classmethod
     def from_tracks(cls, tracks: pd.DataFrame, area: Area) -> Crowd:
@@ -165,23 +165,23 @@ class Crowd:
         day = np.unique(rows.day, return_inverse=True)[1]
         rows = replace(rows, day=day, piece=np.r_[0, np.cumsum(gaps)])
         near = rows.within(area.grown(_BEYOND))
-        at = np.flatnonzero(near & (rows.tick % TICKS_PER_SECOND == 0))
-        return cls(rows, rows.within(area), at)
+        seconds = np.flatnonzero(near & (rows.tick % TICKS_PER_SECOND == 0))
+        return cls(rows, rows.within(area), seconds)
 
     @cached_property
-    def coarse(self) -> TrackRows:
-        """The rows `at` whole seconds: pairs are sought there."""
-        return self.rows.select(self.at)
+    def coarse_rows(self) -> TrackRows:
+        """The rows at `whole_seconds`: pairs are sought among them."""
+        return self.rows.select(self.whole_seconds)
 
     @cached_property
     def ways(self) -> np.ndarray:
-        """Positions from 1 s before the rows `at` to 1 s after, NaN out of the area, (n, 21)."""
-        return self._around(self.rows.place, self.at, _AROUND)
+        """Positions from 1 s before to 1 s after the `whole_seconds`, NaN out of the area, (n, 21)."""
+        return self._values_around(self.rows.place, self.whole_seconds, _STEPS)
 
     @cached_property
     def unit(self) -> np.ndarray:
         """Number of the unit of each person."""
-        return find_units(self.rows, self.at)
+        return find_units(self.rows, self.whole_seconds)
 
     @cached_property
     def stream(self) -> np.ndarray:
@@ -205,7 +205,9 @@ class Crowd:
         found = count_ends(rows, self.inside, near[1:])
         found |= measure_noise(rows, self.inside)
         passing = met.rows[:, (met.kind > _STANDING) & (met.nearest < NEAR_END)]
-        velocity = self._around(rows.velocity, passing, np.array([-BEFORE, BEFORE]))
+        velocity = self._values_around(
+            rows.velocity, passing, np.array([-BEFORE, BEFORE])
+        )
         velocity = velocity[:, np.isfinite(velocity).all(axis=(0, 2))]
         exchanged = count_exchanged(velocity[..., 0], velocity[..., 1])
         return SensorCheck(**found, passes=velocity.shape[1], exchanged=exchanged)
@@ -213,9 +215,9 @@ class Crowd:
     def meet(self, r_max: float, shifts: np.ndarray | None = None) -> Meetings:
         """Find the pairs of people within `r_max` [m].
 
-        With `shifts` each stream is moved in time by its one [s], and pairs of one stream are left out.
+        With `shifts` each stream is moved in time by its own shift [s], and pairs of one stream are left out.
         """
-        rows, (first, period) = self.coarse, self.rows.recorded
+        rows, (first, period) = self.coarse_rows, self.rows.recorded
         second = rows.tick // TICKS_PER_SECOND - first[rows.day]
         group = rows.person
         if shifts is not None:
@@ -258,44 +260,44 @@ class Crowd:
     def _near_rows(self, met: Meetings, pairs: np.ndarray, r_max: float) -> np.ndarray:
         """Where some `pairs` of `met` are within `r_max` [m]: the pair, and the two people's rows, (3, n).
 
-        What lies between two whole seconds is given twice.
+        A moment between two whole seconds is given twice, once by each of them.
         """
         wanted = np.isin(met.of_pair, pairs)
         near, of_pair = met.near[:, wanted], met.of_pair[wanted]
         moment, step = np.nonzero(self._distances(near) < r_max)
-        both = self.at[near[:, moment]] + _AROUND[step]
+        both = self.whole_seconds[near[:, moment]] + _STEPS[step]
         return np.stack([of_pair[moment], *both])
 
-    def _around(
+    def _values_around(
         self, values: np.ndarray, at: np.ndarray, steps: np.ndarray
     ) -> np.ndarray:
-        """The `values` of rows some `steps` [ticks] after those `at`; NaN out of the area, or past a gap."""
+        """The `values` that lie `steps` [ticks] after the rows `at`; NaN out of the area, or past a gap."""
         start, piece = at[..., None], self.rows.piece
-        around = (start + steps) % len(piece)  # past the ends there is another piece
+        around = (start + steps) % len(piece)  # beyond the ends: another piece
         known = self.inside[around] & (piece[around] == piece[start])
         return np.where(known, values[around], np.nan)
 
     def _distances(self, near: np.ndarray) -> np.ndarray:
-        """Distances of two people around the rows `near` of `coarse` [m], NaN out of the area, (n, 21)."""
+        """Distances of two people around the `coarse_rows` `near` [m], NaN out of the area, (n, 21)."""
         return np.asarray(np.abs(np.subtract(*self.ways[near])))
 
     def _approach(
         self, near: np.ndarray, of_pair: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of each pair: its rows where it is nearest (2, n), the distance [m], and the position in `near`."""
-        likely = _likely_nearest(self.coarse, near, 0.5)
-        likely[~self.inside[self.at[near]].all(axis=0)] += 2 * REACH
+        likely = _likely_nearest(self.coarse_rows, near, 0.5)
+        likely[~self.inside[self.whole_seconds[near]].all(axis=0)] += 2 * REACH
         least = np.minimum.reduceat(likely, firsts(of_pair))
         at = np.flatnonzero(likely == least[of_pair])
         at = at[firsts(of_pair[at])]
         distance = np.nan_to_num(self._distances(near[:, at]), nan=np.inf)
         step = distance.argmin(axis=1)
-        return self.at[near[:, at]] + _AROUND[step], distance.min(axis=1), at
+        return self.whole_seconds[near[:, at]] + _STEPS[step], distance.min(axis=1), at
 
     def _kinds(self, near: np.ndarray, of_pair: np.ndarray) -> np.ndarray:
         """Number of the kind of each pair, from its rows at whole seconds."""
-        pairs = self.coarse.person[near[:, firsts(of_pair)]]
-        codes = classify_motion(self.coarse, near, of_pair, pairs.shape[1])
+        pairs = self.coarse_rows.person[near[:, firsts(of_pair)]]
+        codes = classify_motion(self.coarse_rows, near, of_pair, pairs.shape[1])
         (unit, own), (stream, other) = self.unit[pairs], self.stream[pairs]
         rules = [unit == own, (stream == other) & (codes != _STANDING)]
         names = [KINDS.index(kind) for kind in (COMPANIONS, SAME)]
@@ -305,8 +307,8 @@ class Crowd:
         self, near: np.ndarray, at: np.ndarray, r_max: float
     ) -> np.ndarray:
         """Number of other people within `r_max` [m] of one of two who are in the rows `at` of `near`."""
-        close = near[:, self.coarse.distance(*near) < r_max]
-        around = np.bincount(close.ravel(), minlength=len(self.coarse))
+        close = near[:, self.coarse_rows.distance(*near) < r_max]
+        around = np.bincount(close.ravel(), minlength=len(self.coarse_rows))
         return np.asarray(np.maximum(around[near[:, at]].max(axis=0) - 1, 0))
 
 

@@ -1,12 +1,12 @@
 """Where people were, and when: files of any format become one table of tracks on one clock.
 
-recipe        how files are read: `Recipe`, and the shapes of files that have a name
+recipe        how files are read: `Recipe`, and `Shape`, a kind of files that has a name
 sources       files unpacked and recognised; text as columns; large files scanned
-shapes        other files and tables as columns: Parquet, Feather, SQLite, JSON, those of libraries
-funnels       how many rows entered each stage, and why others were rejected; whether people move as they can
-plausibility  with which other recipe people would walk
+shapes        other files, and tables of libraries, as columns: Parquet, Feather, SQLite, JSON, named shapes
+funnels       how many rows entered each stage, and why others were rejected; whether people can move so
+plausibility  advice where people do not walk: a recipe with which they would; a description with a map
 columns       which column holds what; from columns to rows in seconds and metres
-readers       rows of files as they are: `read_raw`; several files: pieces of one recording, or others
+readers       rows of files as they are: `read_raw`; several files: pieces of one recording, or separate ones
 clock         rows brought to multiples of 0.1 s, with velocities: `read_tracks`, `to_clock`
 datasets      named data and paths, downloads verified by hash
 """

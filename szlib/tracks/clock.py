@@ -47,7 +47,7 @@ _ROUNDING = 1e-6
 
 _LAST_SECOND = 1e11  # latest time [s]; up to here ticks are exact
 
-# More samples than this share, and than a few, without a tick mean that times or ids were misread (assumed).
+# If more samples than this share, and than so many, have no tick, times or ids were misread (assumed).
 _MOST_LOST, _FEW = 0.5, 20
 
 _BYTES_PER_TICK = 200  # memory of a tick while a table is brought to the clock [bytes] (measured: 188)
@@ -184,9 +184,8 @@ def _on_clock(
     piece = np.repeat(np.arange(len(begin)), count)
     at = np.arange(len(piece))
     tick = at - np.repeat(start - first, count)
-    slot = next_tick - np.repeat(
-        first - start, size
-    )  # of the first tick after each row
+    # position of the first tick after each row
+    slot = next_tick - np.repeat(first - start, size)
     row = np.repeat(np.arange(len(t)), np.diff(slot, append=len(piece)))
     row = np.minimum(row, np.maximum(end - 1, begin)[piece])
     after = np.minimum(row + 1, end[piece])

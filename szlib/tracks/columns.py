@@ -1,6 +1,7 @@
 """From the columns of a file or table to its rows: t [s], id, x, y [m], as a recipe says.
 
-Columns are found by the names given, by usual names, or by how people would walk.
+Columns are found by the names given or by usual names.  Where that fails, the error says with which columns
+people would walk.  Values are converted here, too: numbers, times and ids.
 """
 
 from __future__ import annotations
@@ -18,19 +19,20 @@ import polars as pl
 from polars import Float64, Int64, Series, String, col, exceptions
 
 from ..core.errors import DataError
-from ..core.input_files import explained
+from ..core.input_files import explain_errors
 from .plausibility import suggest_columns
 from .recipe import DEGREES, NAMES, PIXELS, SHAPES, TIME_UNITS, Recipe, advise
 from .shapes import open_arrow, open_database, open_json, open_shape
 from .sources import CONTAINERS, File, Rows, Source, recognise
 
-_CLOCK = re.compile(r"(time|sec|stamp|frame|zeit|hour|minute)")  # in names of times
-# people have so many rows under each value that tells recordings apart
-_LONGEST_SHARE = 5
+# parts of names of columns that hold times, not recordings
+_TIMES = re.compile(r"(time|sec|stamp|frame|zeit|hour|minute)")
+# mean number of rows of a person in a recording, at least, where a column tells recordings apart
+_MIN_ROWS = 5
 _FRAMES = 25.0  # a usual frame rate [1/s], for advice
-_LISTED = 40  # number of columns that are looked at
+_MAX_COLUMNS = 40  # number of columns that are looked at
 _PIXEL = 0.02  # metres in a pixel that an error message shows as an example
-_TRIED = 8  # number of columns that are tried out, with those that are known
+_MAX_TRIALS = 8  # number of columns that are tried, with those that are given
 _SAMPLE = 2000  # rows in which columns are guessed
 
 # Times without a unit whose median is larger count in this unit since 1970: as seconds they would be
@@ -39,19 +41,19 @@ _SINCE_1970 = {1e17: "ns", 1e14: "us", 1e11: "ms", 0.0: "s"}
 _DATE = r"^(?:19|20)\d{2}-\d{2}-\d{2}"  # beginning of an ISO time
 _ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
 _EXCEL_1970 = 25_569  # number of the day 1970-01-01 in Excel
-_SHORT = 11  # bits of a hash that are left out: a float holds the others exactly
-_EXACT = 2.0**53  # floats hold smaller whole numbers exactly
+_DROPPED_BITS = 11  # bits of a hash that are left out: a float holds the others exactly
+_LARGEST_EXACT = 2.0**53  # floats hold smaller whole numbers exactly
 
 
 def open_source(file: File) -> tuple[Source, Recipe]:
-    """The columns of a `file`, and its recipe over that of its shape.
+    """The columns of a `file`, and its recipe completed by that of its shape.
 
-    Of the tables of a database it is the one that can be tracks.
+    A database gives the columns of the one table that can hold tracks.
     """
     path, recipe, head = file.path, file.recipe, file.head
     shape, readable = recognise(head, path, recipe), list[Source]()
-    is_free = recipe.file_format is None
-    tables = open_database(file) if is_free and shape.name == "jupedsim" else []
+    is_unknown = recipe.file_format is None
+    tables = open_database(file) if is_unknown and shape.name == "jupedsim" else []
     if any({"frame", "id", "pos_x"} <= set(table.names) for table in tables):
         tables = []  # PedPy reads them
     for table in tables:
@@ -61,7 +63,7 @@ def open_source(file: File) -> tuple[Source, Recipe]:
     if len(readable) > 1:
         command = f"sqlite3 -header -csv {path.name} 'SELECT * FROM NAME' > tracks.csv"
         raise DataError(
-            f"{path}: several of the tables {len(tables)} can be tracks; write one to a file: {command}"
+            f"{path}: several of the {len(tables)} tables can be tracks; write one to a file: {command}"
         )
     if head.startswith(CONTAINERS):
         source = open_arrow(file)
@@ -71,8 +73,8 @@ def open_source(file: File) -> tuple[Source, Recipe]:
         source = open_json(file)
     else:
         source, recipe = open_shape(shape, file)
-        is_free = False
-    if is_free:
+        is_unknown = False
+    if is_unknown:
         shape = recognise(",".join(source.names), path, recipe)
         shape = SHAPES["tidy"] if shape.parse else shape
     columns = dict(shape.recipe.columns)
@@ -83,11 +85,12 @@ def open_source(file: File) -> tuple[Source, Recipe]:
 
 
 def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
-    """The rows of a `source`, read with a `recipe`; `ask` about a column that may tell recordings apart.
+    """The rows of a `source`, read with a `recipe`.
 
-    Raises DataError where columns are missing or unclear, or a value of the recipe does not fit.
+    Raises DataError where columns are missing or unclear, or a value of the recipe does not fit.  With `ask`
+    a column that may tell recordings apart is such an error, too.
     """
-    named, path, decimal = recipe.names_people, source.where, source.decimal
+    named, path, decimal = recipe.has_people, source.where, source.decimal
     recipe = find_columns(source, recipe)
     values = {name: column_of(source, at) for name, at in recipe.columns.items()}
     numbers = {
@@ -180,11 +183,11 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
     unit = units.pop() if len(units) == 1 else None
     clock = NAMES["time_units"].get(stated.get("t"))
     recipe = recipe.over(Recipe(columns=found, time_unit=clock, unit=unit))
-    _require_known(where, recipe)
+    _check_units(where, recipe)
     return recipe
 
 
-def _require_known(where: str, recipe: Recipe) -> None:
+def _check_units(where: str, recipe: Recipe) -> None:
     """Raise DataError where frames have no rate, times have one, or pixels no scale."""
     columns, guesses = recipe.columns, dict[str, float]()
     if "t" in columns and recipe.frame_rate is not None:
@@ -198,7 +201,7 @@ def _require_known(where: str, recipe: Recipe) -> None:
         missing.append(
             f"{columns['frame']!r} counts frames; pass frame_rate=, frames a second of the video"
         )
-    if recipe.unit == PIXELS and not recipe.has_places:
+    if recipe.unit == PIXELS and not recipe.has_metres:
         guesses["scale"] = _PIXEL
         missing.append(
             "positions are in pixels; pass scale=, metres in a pixel, or homography=, 3 x 3 numbers that map "
@@ -211,7 +214,7 @@ def _require_known(where: str, recipe: Recipe) -> None:
 
 
 def column_of(source: Source, at: str | int) -> Series:
-    """The column of a `source` `at` a number or a name; or the sum of columns that it says, in SQL."""
+    """The column of a `source` whose number or name is `at`, or the sum of columns that `at` is in SQL."""
     names = [name or f"f{k}" for k, name in enumerate(source.names)]
     if at in source.names:
         at = source.names.index(at)
@@ -223,7 +226,7 @@ def column_of(source: Source, at: str | int) -> Series:
         return source.column(at)
     lacks = f"{source.where} has no column {at}"
     faults = exceptions.PolarsError
-    with explained(lacks, "and it is no sum of columns", faults=faults):
+    with explain_errors(lacks, "and it is no sum of columns", faults=faults):
         sum_ = pl.sql_expr(at)
         roots = sum_.meta.root_names()
         if not roots or not set(roots) <= set(names):
@@ -239,9 +242,9 @@ def ask_about_recordings(
 ) -> None:
     """Raise DataError where a column of `source` that the `recipe` does not use tells recordings apart.
 
-    Such a column has few values, and changes where people are at one time twice, or go back in time.  With
-    `by_name` one is also asked about if it has a usual name, and people are seen under several of its values.
-    `rows` has id and t of all rows.
+    Such a column has few values.  It changes where a person has two rows at one time, or where times go back.
+    With `by_name` a column with a usual name of recordings is meant, too, if people are seen under several of
+    its values.  `rows` has id and t of all rows.
     """
     step = col.t.diff()
     is_mixed = rows.select((step.over("id") <= 0).any()).item()
@@ -249,12 +252,12 @@ def ask_about_recordings(
     for k, name in enumerate(source.names):
         key, shown = _split_unit(name)[0], name or f"f{k}"
         is_usual = by_name and key in NAMES["kinds"]["recordings"].split()
-        is_used = shown in used or k in recipe.columns.values() or _CLOCK.search(key)
+        is_used = shown in used or k in recipe.columns.values() or _TIMES.search(key)
         if is_used or not (is_mixed or is_usual):
             continue
         table = rows.select("id", "t", c=source.column(k).cast(String))
         n_pieces = table.select("id", "c").n_unique()
-        if table["c"].n_unique() < 2 or n_pieces * _LONGEST_SHARE > len(rows):
+        if table["c"].n_unique() < 2 or n_pieces * _MIN_ROWS > len(rows):
             continue
         is_still = table.select((step.over("id", "c") <= 0).any()).item()
         if n_pieces > rows["id"].n_unique() and (is_usual or not is_still):
@@ -288,9 +291,9 @@ def _candidates(quantity: str, recipe: Recipe, names: Sequence[str]) -> list[str
 
 
 def suggest_reading(source: Source | None, recipe: Recipe) -> str:
-    """As which columns of a `source` people would walk, and how to read them; empty where there are none.
+    """Advice how to read a `source` so that people walk; empty where no columns do it.
 
-    The columns in the `recipe` are taken as they are.  A constant column is none of the others.
+    Columns that the `recipe` names are taken as they are.  Constant columns are left out of the search.
     """
     if source is None:
         return ""
@@ -299,18 +302,18 @@ def suggest_reading(source: Source | None, recipe: Recipe) -> str:
         name for name in ("t", "frame", "id", "x", "y") if name in recipe.columns
     ]
     given = [recipe.columns[name] for name in quantities]
-    names = [name or k for k, name in enumerate(source.names[:_LISTED])]
+    names = [name or k for k, name in enumerate(source.names[:_MAX_COLUMNS])]
     for at in dict.fromkeys([*given, *(names if len(given) < 4 else [])]):
         values = column_of(source, at).head(_SAMPLE)
         unit = recipe.time_unit if at == time else None
         found = [to_times(values, "UTC", unit, decimal)[0] for decimal in ".,"]
         usual = min(found, key=Series.null_count)
-        if 2 * usual.null_count() > len(values):  # of texts each gets a number
+        if 2 * usual.null_count() > len(values):  # each text gets a number
             usual = to_ids(values, source.where).cast(Float64)
         numbers = usual.fill_null(np.nan).to_numpy()
         usable = numbers[np.isfinite(numbers)]
         is_varied = 2 * len(usable) > len(numbers) and np.ptp(usable) > 0
-        if at in given or (is_varied and len(columns) < _TRIED):
+        if at in given or (is_varied and len(columns) < _MAX_TRIALS):
             columns[at] = numbers
     return suggest_columns(columns, recipe)
 
@@ -319,7 +322,7 @@ def suggest_reading(source: Source | None, recipe: Recipe) -> str:
 
 
 def to_numbers(values: Series, decimal: str = ".") -> Series:
-    """The numbers in a column of `values`; null where one is no number.  `decimal` is the point of texts."""
+    """The numbers in a column of `values`; null where one is no number.  `decimal` is their decimal point."""
     if values.dtype == String:
         values = values.str.strip_chars(" \"'").str.replace(decimal, ".", literal=True)
     try:
@@ -331,7 +334,7 @@ def to_numbers(values: Series, decimal: str = ".") -> Series:
 def to_times(
     values: Series, tz: str, unit: str | None = None, decimal: str = "."
 ) -> tuple[Series, Series | None]:
-    """The times in a column of `values`: numbers with a point `decimal`, dates, durations, ISO texts.
+    """The times in a column of `values`: numbers (`decimal` is their point), dates, durations, ISO texts.
 
     Numbers are in a `unit` of time; None takes seconds, or a shorter unit for counts since 1970.  Times
     without a zone are those of `tz`.  Returns seconds, since 1970 where times are dates; and the local date
@@ -383,9 +386,9 @@ def to_ids(values: Series, where: Path) -> Series:
     if values.dtype == String and 2 * number.count() < values.count():
         names = values.drop_nulls().unique()
         hashes = pd.util.hash_array(names.to_numpy().astype(object), categorize=False)
-        numbers = Series((hashes >> _SHORT).astype("int64"))
+        numbers = Series((hashes >> _DROPPED_BITS).astype("int64"))
         return values.replace_strict(names, numbers, default=None)
-    is_whole = (number == number.floor()) & (number.abs() < _EXACT)
+    is_whole = (number == number.floor()) & (number.abs() < _LARGEST_EXACT)
     whole = number.set(~is_whole, None).cast(Int64, strict=False)
     if not values.dtype.is_float():
         whole = values.cast(Int64, strict=False).fill_null(whole)

@@ -21,7 +21,7 @@ from pathlib import Path
 import pooch
 
 from ..core.errors import DataError, warn
-from ..core.input_files import explained, printable
+from ..core.input_files import explain_errors, printable
 
 SYNTHETIC = "synthetic"
 # A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network.
@@ -46,7 +46,7 @@ class DataSet:
     Attributes
     ----------
     url : folder of the files.
-    hashes : hash of its content by file name: SHA-256, or the shorter `git_blob_id`.
+    hashes : hash of the content of each file, by its name: SHA-256, or the shorter `git_blob_id`.
     """
 
     url: str
@@ -150,7 +150,7 @@ def _find_named(name: str) -> list[Path]:
 
 
 def _fetch(store: pooch.Pooch, name: str, data: DataSet) -> Path:
-    """A file from the cache, or downloaded into it; a file with a wrong hash does not stay there."""
+    """A file from the cache, or downloaded into it; a file with a wrong hash is removed."""
     for _ in range(_ATTEMPTS):
         file = Path(store.fetch(name, progressbar=True))
         if not (fault := data.find_fault(file)):
@@ -162,7 +162,9 @@ def _fetch(store: pooch.Pooch, name: str, data: DataSet) -> Path:
 def _expand(name: str | Path) -> list[Path]:
     """The regular files that a path stands for; reading a FIFO or a device would never end."""
     path, shown = Path(name), printable(name)
-    with explained(f"{shown}: cannot be looked up", f"expected {_NAMED}, or paths"):
+    with explain_errors(
+        f"{shown}: cannot be looked up", f"expected {_NAMED}, or paths"
+    ):
         found = [path] if path.exists() or path.is_symlink() else []
         if path.is_dir():
             found = [file for file in path.iterdir() if not file.name.startswith(".")]

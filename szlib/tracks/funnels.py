@@ -3,7 +3,7 @@
 A table has its funnel in ``DataFrame.attrs["funnel"]``, which Parquet preserves.  Each stage is a plain dict
 with the keys stage, entered, kept and rejected, so that the funnel stays with the data.
 
-Here are also the reasons: what makes a row unusable, and what people cannot do.  People walk at 1 to 2 m/s,
+The reasons are here, too: what makes a row unusable, and what people cannot do.  People walk at 1 to 2 m/s,
 are seen every few seconds at the latest, and a site is between a metre and a kilometre wide.
 """
 
@@ -32,8 +32,10 @@ MISSING, NO_ID = "missing or not a number", "id not a whole number"
 # 2100-01-01; later time stamps are not seconds since 1970
 LAST_SECOND = 4_102_444_800.0
 FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
-MOST_SHOWN = 200_000  # number of rows that are looked at
-# widest site [m]; a smaller site [m] means that metres were read as millimetres
+# number of rows, the first ones, by which the motion of people is judged
+MAX_ROWS = 200_000
+# Positions within the first [m] of the origin are metres that were read as a smaller unit; a site wider
+# than the second [m] is millimetres that were read as metres.
 _SITES = (0.5, 1000.0)
 # greatest median and greatest 90 % quantile of the speed of people [m/s]
 _FASTEST = (3.0, 6.0)
@@ -41,7 +43,8 @@ _FASTEST = (3.0, 6.0)
 _WALKS = (0.6, 4.0)
 # shortest and longest usual time between two samples of a person [s]
 _STEPS = (0.005, 5.0)
-_ROUGH = 1.0  # greatest roughness of ways; people who are mixed up have 1.4 and more
+# greatest roughness of ways; people whose ids are mixed up have 1.4 and more
+_ROUGH = 1.0
 _MIN_STEPS = 20  # number of steps that allows a judgement
 # greatest interquartile range of the sampling interval, over its median, of a regular clock
 _REGULAR = 0.5
@@ -277,25 +280,26 @@ def _spread(places: np.ndarray) -> float:
 def first_rows(rows: pl.DataFrame) -> np.ndarray:
     """The first of `rows` as t, number of the person, x, y, shape (4, n)."""
     person = col.id.rank("dense")  # floats do not tell large ids apart
-    first = rows.head(MOST_SHOWN).select("t", person, "x", "y")
+    first = rows.head(MAX_ROWS).select("t", person, "x", "y")
     return first.to_numpy().astype(float).T
 
 
 def check_people(
     rows: Rows, good: pl.DataFrame, given: Recipe, suggest: Callable[[], str]
 ) -> None:
-    """Raise DataError where people cannot move as in a table, or on such a site; suggest another reading.
+    """Raise DataError where people cannot move like this, or on such a site; suggest another reading.
 
-    Where the user has given the unit, a DataWarning is enough, as where people may just all be standing.
+    Where the user has given the unit, the motion gives a DataWarning instead.  People who do not walk may all
+    be standing: that is an error only where another reading makes them walk.
 
     Parameters
     ----------
-    rows : how the file was read.
+    rows : the file, and how it was read.
     good : its usable rows t [s], id, x, y [m].
     given : the recipe that the user gave.
-    suggest : gives advice how to read the file.
+    suggest : a function that gives advice how to read the file.
     """
-    seen, is_given, recipe = first_rows(good), given.has_places, rows.recipe
+    seen, is_given, recipe = first_rows(good), given.has_metres, rows.recipe
     if not recipe.shape.is_sure:
         found, fault = measure_motion(seen), "people are seen too briefly"
         if found is not None:

@@ -1,4 +1,7 @@
-"""With which recipe people would walk, where they cannot in a table; and a table described with a map."""
+"""Advice for files in which people do not walk: another recipe with which they would, or a map of the rows.
+
+`suggest_columns` tries other units, times and columns.  `describe_rows` shows how and where people move.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from .funnels import MOST_SHOWN, first_rows, measure_motion
+from .funnels import MAX_ROWS, first_rows, measure_motion
 from .recipe import DEGREES, TIME_UNITS, UNITS, Recipe, advise
 
 _DEGREE = 111_320.0  # metres in a degree of latitude, or of longitude at the equator
@@ -43,7 +46,8 @@ def _changes(
 ) -> Iterator[tuple[dict[str, Any], dict[str, Any], list[float]]]:
     """Changes of a `recipe`, the likeliest first.
 
-    Each with the columns of t (or frame), id, x and y, None where one is free, and the factors of these four.
+    Each comes with the columns of t (or frame), id, x and y, None where one has to be found, and with the
+    factors of these four.
     """
     given, metres = recipe.columns, recipe.metres
     people: dict[str, Any] = {name: given.get(name) for name in ("id", "x", "y")}
@@ -72,7 +76,8 @@ def _find_walking(
 ) -> list[Any]:
     """The columns in which people walk, as t, id, x, y; empty where there are none.
 
-    Of several orders, ways are smoothest, t has the most regular clock, and most columns are in place.
+    Of several orders, the one with the smoothest ways is taken, then the one with the most regular times,
+    then the one in which fewest columns change their places.
     """
     found: list[Any] = []
     kept = list(known.values())
@@ -95,14 +100,14 @@ def _find_walking(
 def describe_rows(rows: pl.DataFrame, recipe: Recipe, name: str) -> str:
     """The first of `rows` t [s], id, x, y [m] of a file called `name`, and its `recipe`, in a few lines.
 
-    They say how people move and where, and draw a map.
+    The lines say how and where people move, and draw a map.
     """
     shown = ", ".join(f"{name} = {at}" for name, at in recipe.columns.items())
     lines = [f"{name} is read as {recipe.file_format}: {shown}"]
     if rows.height == 0:
         return lines[0]
     t, _, x, y = seen = first_rows(rows)
-    first = "first " if len(t) == MOST_SHOWN else ""
+    first = "first " if len(t) == MAX_ROWS else ""
     lines.append(
         f"{first}{len(t):,} rows: {rows['id'].n_unique():,} people in {np.ptp(t):,.1f} s"
     )

@@ -20,14 +20,14 @@ import polars as pl
 from polars import Expr, LazyFrame, Series, String, col, exceptions, lit
 
 from ..core.errors import DataError, warn
-from ..core.input_files import explained, printable
+from ..core.input_files import explain_errors, printable
 from . import funnels
 from .columns import column_of, load_rows, open_source, suggest_reading
 from .funnels import check_people, find_implausible, rejection_reason
 from .plausibility import describe_rows
 from .recipe import SHAPES, Recipe, advise, find_recipe
 from .shapes import open_table
-from .sources import SCANNED, Rows, charge, is_table, opened, scan_streamed
+from .sources import SCAN_FACTOR, Rows, check_size, is_table, open_plain, scan_streamed
 
 EXPECTED = (
     "expected a table (text, Parquet, Feather, SQLite, JSON lines) with columns t or frame, id, x, y; or one "
@@ -47,7 +47,7 @@ _HEAD = 1 << 16  # bytes of a text by which its day is found
 _FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
 
 Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
-"""The needed rows of some, given their area and the longest gap within a track [s]."""
+"""A function of rows, their area and the longest gap within a track [s], which gives the rows needed."""
 
 
 class LoadedFile(NamedTuple):
@@ -59,7 +59,7 @@ class LoadedFile(NamedTuple):
     recipe : how it was read, with its columns.
     rows : its usable rows: day, id, t [s], x, y [m].
     is_named : whether its name is its day: it has no calendar, and can be a piece of a recording.
-    stage : of its funnel.
+    stage : its stage of the funnel.
     """
 
     path: Path
@@ -189,11 +189,11 @@ def _merge(
 def open_rows(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[Rows]:
     """Open file `path` with a `recipe`, without reading it as a whole, where its shape allows that.
 
-    Of a text only `size` bytes are read.  Raises DataError where the file cannot be read.
+    Of a text only `size` bytes are read (None: all).  Raises DataError where the file cannot be read.
     """
     faults = exceptions.PolarsError, exceptions.PanicException
-    with opened(path, recipe, size) as file:
-        with explained(f"{path}: cannot be read", EXPECTED, faults=faults):
+    with open_plain(path, recipe, size) as file:
+        with explain_errors(f"{path}: cannot be read", EXPECTED, faults=faults):
             rows = scan_streamed(file) or load_rows(
                 *open_source(file), ask=size is None
             )
@@ -201,11 +201,11 @@ def open_rows(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[R
 
 
 def _read_file(source: Any, number: int, recipe: Recipe) -> LoadedFile:
-    """The usable rows of one file or table, of which a table is called by its `number`."""
+    """The usable rows of one file or table `source`; a table is called table-1, ..., by its `number`."""
     if not is_table(source):
         path = Path(source)
         with open_rows(path, recipe) as rows:
-            charge(rows.n_bytes, path, factor=SCANNED)
+            check_size(rows.n_bytes, path, factor=SCAN_FACTOR)
             return _accept(rows, recipe)
     if hasattr(source, "data") and hasattr(source, "frame_rate"):  # PedPy's
         rate = float(source.frame_rate)
@@ -216,7 +216,7 @@ def _read_file(source: Any, number: int, recipe: Recipe) -> LoadedFile:
 
 
 def _accept(rows: Rows, given: Recipe) -> LoadedFile:
-    """The usable ones of `rows`, for which the recipe `given` was given.
+    """Select the usable ones of the `rows` of a file that was read with the recipe `given` by the user.
 
     Raises DataError where there is none, too many are rejected, or people cannot move like this.
     """
@@ -242,7 +242,7 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
 def _count_rejected(
     rows: Rows, bad: pl.DataFrame, n: int, suggest: Callable[[], str]
 ) -> dict[str, int]:
-    """Count and warn of the `bad` ones of `n` rows by reason; DataError above `Recipe.max_rejected`."""
+    """Count the `bad` ones of `n` rows by reason, and warn; raise DataError above `Recipe.max_rejected`."""
     reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     if not reasons:
         return reasons
@@ -269,7 +269,7 @@ def _count_rejected(
 
 
 def _show_field(rows: Rows, line: int, name: str) -> str:
-    """The column that holds `name`, and what is in it at a `line`, for people."""
+    """The column that holds the quantity `name`, and what is in it at a `line`, for messages."""
     columns, source = rows.recipe.columns, rows.source
     if source is None:
         return f"column {name}"
@@ -293,13 +293,13 @@ def select_usable(scan: LazyFrame) -> LazyFrame:
 def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:
     """A description of file `path`, read with a `recipe`, by its first rows; and this recipe, completed."""
     with open_rows(path, recipe) as rows:
-        first = select_usable(rows.table).head(funnels.MOST_SHOWN).collect()
+        first = select_usable(rows.table).head(funnels.MAX_ROWS).collect()
     return describe_rows(first, rows.recipe, path.name), rows.recipe
 
 
 def find_format(path: Path, recipe: Recipe) -> Recipe:
-    """The `recipe` completed by that of the shape of file `path`; itself where the file cannot be read."""
-    with suppress(DataError, OSError), opened(path, recipe, _HEAD) as file:
+    """The `recipe` completed by that of the shape of file `path`; unchanged where that cannot be read."""
+    with suppress(DataError, OSError), open_plain(path, recipe, _HEAD) as file:
         return open_source(file)[1]
     return recipe
 
@@ -328,7 +328,7 @@ def local_dates(t: Series, recipe: Recipe) -> Series | None:
         return moments.dt.convert_time_zone(recipe.tz or "UTC").dt.date()
 
     first, last = dates(Series([seconds.min(), seconds.max()]))
-    is_one = first == last  # as a rule; several times as fast
+    is_one = first == last  # mostly so; several times as fast
     return pl.repeat(first, len(t), eager=True) if is_one else dates(t)
 
 
@@ -339,9 +339,9 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     """Give different recordings among `files` another `day`, so that no person is in two of them.
 
     Files without a calendar are recordings of their own, called by their names, unless people continue from
-    one to the other, as in pieces of one recording (not for EWAP).  Files of a calendar day are its pieces.
-    If most of the people in both of two files are in two places at once, the files are separate recordings
-    after all, with a DataWarning; if only some are, a DataError is raised.
+    one to the other, as in pieces of one recording (EWAP files never are).  Files of a calendar day are its
+    pieces.  If most of the people in both of two files are in two places at once, the files are separate
+    recordings after all, with a DataWarning; if only some are, a DataError is raised.
     """
     sequences = [file.path for file in files if file.recipe.shape.is_sequence]
     check_names(list(map(file_stem, sequences)))

@@ -20,13 +20,13 @@ import numpy as np
 
 from ..core.errors import DataError
 from ..core.files import write_file
-from ..core.input_files import explained, read_small, reading, require
+from ..core.input_files import explain_errors, read_small, reading, require
 
 # Which column holds each quantity: its name, the number of the field from 0, or a sum of columns in SQL.
 Columns = Mapping[str, str | int]
 QUANTITIES = ("t", "frame", "id", "x", "y", "day", "speed")
 _FOLDER = Path(__file__).parent
-# Usual names of columns and of units.
+# Usual names of columns and of units, and the factors of units.
 NAMES = tomllib.loads((_FOLDER / "names.toml").read_text("utf-8"))
 UNITS = NAMES["metres"]
 """Metres in a unit of position."""
@@ -47,10 +47,10 @@ _BOUNDS = {
     "max_gap": (SHORTEST_GAP + 1e-9, np.inf, "longer than the clock's 0.1 s"),
     "max_rejected": (0, 1, "from 0 to 1"),
 }
-_SHAPES = tomllib.loads((_FOLDER / "shapes.toml").read_text("utf-8"))
+_ENTRIES = tomllib.loads((_FOLDER / "shapes.toml").read_text("utf-8"))
 # What a value must be one of, and the shapes of arrays.
 _CHOICES = {
-    "file_format": _SHAPES,
+    "file_format": _ENTRIES,
     "unit": [*UNITS, PIXELS, DEGREES],
     "time_unit": TIME_UNITS,
 }
@@ -131,7 +131,7 @@ class Recipe:
         is_text = isinstance(self.where, str | None)
         require(is_text, "where", self.where, "a condition in SQL, as text")
         unknown = f"unknown time zone {self.tz!r}"
-        with explained(unknown, "expected one like 'Asia/Tokyo'"):
+        with explain_errors(unknown, "expected one like 'Asia/Tokyo'"):
             ZoneInfo(self.tz or "UTC")
 
     @property
@@ -145,12 +145,12 @@ class Recipe:
         return self.scale or UNITS.get(self.unit or "m", 1.0)
 
     @property
-    def has_places(self) -> bool:
-        """Whether it says how positions become metres."""
+    def has_metres(self) -> bool:
+        """Whether it states how positions become metres."""
         return self.unit in UNITS or bool(self.scale or self.homography or self.origin)
 
     @property
-    def names_people(self) -> bool:
+    def has_people(self) -> bool:
         """Whether it names the columns of id, x and y."""
         return {"id", "x", "y"} <= set(self.columns)
 
@@ -202,16 +202,16 @@ class Shape:
     Attributes
     ----------
     name : of the shape.
-    recipe : how it is read; values that users give are taken before.
+    recipe : how it is read; values that users give take precedence.
     begins : regular expression for the first two lines; its named groups stand in braces in columns.
-    file : regular expression for the name of the file; its named groups as well.
+    file : regular expression for the name of the file; its named groups stand in columns, too.
     header : names that are in its header.
     n_fields : number of fields of a row without header.
-    has_header : whether the first line names the columns; None looks at it.
+    has_header : whether the first line names the columns; None: if it has a text that is no number.
     parse : what makes a table of the file: a name in `shapes.PARSERS`, or of a loader of PedPy.
     is_sequence : whether each file is a recording of its own, without a calendar.
     is_streamed : whether files are too large to be read as a whole.
-    is_sure : whether units and columns cannot be others.
+    is_sure : whether units and columns are certain: no others are suggested.
 
     Examples
     --------
@@ -235,7 +235,7 @@ class Shape:
 
 SHAPES = {
     name: Shape(name, Recipe(**entry.pop("recipe", {})), **entry)
-    for name, entry in _SHAPES.items()
+    for name, entry in _ENTRIES.items()
 }
 """Shapes by name, in the order of recognition; "tidy" is any other table."""
 

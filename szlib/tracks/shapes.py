@@ -26,9 +26,9 @@ from polars import Series, col, selectors
 
 from ..core.checks import check_columns
 from ..core.errors import DataError, SzlibError, warn
-from ..core.input_files import explained, reading
+from ..core.input_files import explain_errors, reading
 from .recipe import SHAPES, Recipe, Shape
-from .sources import File, Source, charge, open_text
+from .sources import File, Source, check_size, open_text
 
 # Central square of the ATC mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues).
 ATC_AREA = ((-18.5, -7.5), (-10.0, 8.0))
@@ -50,11 +50,11 @@ _PEDPY_ADVICE = (
 )
 
 # The table of a file, and the values of a recipe that the file states.
-Parsed = tuple[pl.DataFrame | pd.DataFrame | Source, dict[str, Any]]
+ParsedFile = tuple[pl.DataFrame | pd.DataFrame | Source, dict[str, Any]]
 
 
 def open_shape(shape: Shape, file: File) -> tuple[Source, Recipe]:
-    """The table of a `file` of a `shape`, and its recipe completed by the file."""
+    """The table of a `file` of a `shape`, and its recipe completed by what the file states."""
     recipe, n = file.recipe, shape.n_fields
     if not shape.parse:
         return open_text(file, False if n else shape.has_header, n), recipe
@@ -118,10 +118,10 @@ def _with_points(table: pd.DataFrame, where: Path) -> pd.DataFrame:
 
 
 def open_arrow(file: File) -> Source:
-    """A Parquet or Feather `file`.  By pyarrow: a damaged file can make Polars abort the process."""
+    """A Parquet or Feather `file`, read by pyarrow: a damaged file can make Polars abort the process."""
     kind = "Parquet" if file.head.startswith("PAR1") else "Feather"
     what, advice = f"{file.path}: damaged {kind}", "fetch or write the file again"
-    with explained(what, advice):
+    with explain_errors(what, advice):
         is_parquet = kind == "Parquet"
         opened = (pq.ParquetFile if is_parquet else pa.ipc.open_file)(file.plain)
         schema = opened.schema_arrow if is_parquet else opened.schema
@@ -129,11 +129,13 @@ def open_arrow(file: File) -> Source:
 
     def column(k: int) -> Series:
         """A column of the file."""
-        with explained(what, advice):
+        with explain_errors(what, advice):
             found = schema.field(k)
             batches = data.to_batches(columns=[found.name], batch_size=_ROWS_AT_ONCE)
-            charged = _charged(batches, lambda batch: int(batch.nbytes), file.path)
-            table = pa.Table.from_batches(charged, pa.schema([found]))
+            checked = _check_batches(
+                batches, lambda batch: int(batch.nbytes), file.path
+            )
+            table = pa.Table.from_batches(checked, pa.schema([found]))
             table.validate(full=True)
             # without metadata
             return pl.DataFrame(pa.table({"c": table[0]})).to_series()
@@ -141,14 +143,14 @@ def open_arrow(file: File) -> Source:
     return Source(file.path, schema.names, column)
 
 
-def _charged(
+def _check_batches(
     batches: Iterable[Any], measure: Callable[[Any], int], where: Path
 ) -> Iterator[Any]:
     """The batches of a column, as long as memory is allowed for all of them; `measure` gives their bytes."""
     size = 0
     for batch in batches:
         size += measure(batch)
-        charge(size, where, "a column")
+        check_size(size, where, "a column")
         yield batch
 
 
@@ -194,7 +196,9 @@ def open_database(file: File) -> list[Source]:
             found = database.execute(text)
             some = iter(lambda: found.fetchmany(_VALUES_AT_ONCE), [])
             yield from chain.from_iterable(
-                _charged(some, lambda rows: sum(map(sys.getsizeof, chain(*rows))), path)
+                _check_batches(
+                    some, lambda rows: sum(map(sys.getsizeof, chain(*rows))), path
+                )
             )
 
     def open_one(table: str) -> Source:
@@ -217,7 +221,7 @@ def open_database(file: File) -> list[Source]:
 # --- shapes that have a parser ------------------------------------------------------------------------
 
 
-def _parse_splines(file: File) -> Parsed:
+def _parse_splines(file: File) -> ParsedFile:
     """UCY's splines: each person's control points x, y [pixels from the middle], frame, direction."""
     lines, rows = iter(file.text().splitlines()), list[list[Any]]()
     for person in range(1, int(next(lines).split()[0]) + 1):
@@ -226,7 +230,7 @@ def _parse_splines(file: File) -> Parsed:
     return pl.DataFrame(rows, schema=["id", "x", "y", "frame"], orient="row"), {}
 
 
-def _parse_ewap(file: File) -> Parsed:
+def _parse_ewap(file: File) -> ParsedFile:
     """EWAP counts frames: their rate follows from the displacement in a frame, and the velocity."""
     source = open_text(file, has_header=False)
     columns = {"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
@@ -258,8 +262,8 @@ def _parse_ewap(file: File) -> Parsed:
     return source, {"frame_rate": rate, "max_gap": gap}
 
 
-def _parse_trajnet(file: File) -> Parsed:
-    """TrajNet++: a JSON object a line; a scene states the samples a second.  Predictions are no tracks."""
+def _parse_trajnet(file: File) -> ParsedFile:
+    """TrajNet++: a JSON object a line; a scene states the samples a second.  Predictions are left out."""
     lines = [json.loads(line) for line in file.text().splitlines() if line]
     rates = [line["scene"].get("fps", 2.5) for line in lines if "scene" in line]
     tracks = [line["track"] for line in lines if "track" in line]
@@ -270,7 +274,7 @@ def _parse_trajnet(file: File) -> Parsed:
     return table, {"frame_rate": float(step * min(rates, default=2.5))}
 
 
-def _parse_pathfinder(file: File) -> Parsed:
+def _parse_pathfinder(file: File) -> ParsedFile:
     """JSON of Pathfinder: an object of people, each an object of times.
 
     PedPy reads it as well, but rounds the number of frames a second: 2.5 becomes 2, and people slow.
@@ -307,8 +311,8 @@ def read_magni_rows(path: Path, plain: Path | None = None) -> pd.DataFrame:
     return people.assign(session=session)[["t", "session", "x", "y", "label", "id"]]
 
 
-def _parse_wide(file: File) -> Parsed:
-    """A table with columns x1, y1, x2, y2, ...: two for each person; a blank is nobody."""
+def _parse_wide(file: File) -> ParsedFile:
+    """A table with columns x1, y1, x2, y2, ...: two for each person; a blank field means an absent person."""
     source = open_text(file)
     table = pl.DataFrame({n: source.column(k) for k, n in enumerate(source.names)})
     places = selectors.matches(r"(?i)^[xy]_?\d+$")
@@ -321,8 +325,8 @@ def _parse_wide(file: File) -> Parsed:
     return replace(open_table(rows, file.path), decimal=source.decimal), {}
 
 
-def _parse_level_x(file: File) -> Parsed:
-    """The inD family: whom a track belongs to, and the frame rate, are in files beside it."""
+def _parse_level_x(file: File) -> ParsedFile:
+    """The inD family: kinds of tracks, such as pedestrian, and the frame rate are in files beside it."""
     table, stated = pl.read_csv(file.plain, infer_schema=False), dict[str, Any]()
     stem, _, ending = file.path.name.partition("_tracks.")
     recording = file.path.with_name(f"{stem}_recordingMeta.{ending}")
@@ -337,7 +341,7 @@ def _parse_level_x(file: File) -> Parsed:
     return table, stated
 
 
-def _parse_nuscenes(file: File) -> Parsed:
+def _parse_nuscenes(file: File) -> ParsedFile:
     """nuScenes: annotations; times, scenes and kinds are in files beside them."""
     tables = []
     for name in ("sample", "instance", "category"):
@@ -357,7 +361,7 @@ def _parse_nuscenes(file: File) -> Parsed:
     return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), {}
 
 
-PARSERS: dict[str, Callable[[File], Parsed]] = {
+PARSERS: dict[str, Callable[[File], ParsedFile]] = {
     "splines": _parse_splines, "ewap": _parse_ewap, "trajnet": _parse_trajnet,
     "magni": lambda file: (read_magni_rows(file.path, file.plain), {}),
     "pathfinder": _parse_pathfinder, "wide": _parse_wide, "level_x": _parse_level_x,
@@ -365,11 +369,11 @@ PARSERS: dict[str, Callable[[File], Parsed]] = {
 }  # fmt: skip
 
 
-def _load_by_pedpy(loader: str, file: File) -> Parsed:
+def _load_by_pedpy(loader: str, file: File) -> ParsedFile:
     """The rows that function `loader` of PedPy gives, and frames a second."""
     path, recipe = file.path, file.recipe
-    with explained(
-        f"{path}: is read by PedPy", "install it: pip install 'szlib[pedpy]'"
+    with explain_errors(
+        f"{path}: PedPy is missing", "install it: pip install 'szlib[pedpy]'"
     ):
         import pedpy
     given: dict[str, Any] = {}
@@ -382,7 +386,7 @@ def _load_by_pedpy(loader: str, file: File) -> Parsed:
                 f"{path}: is juelich-text, which is in 'm' or 'cm'; got unit {got!r}"
             )
         given = {"default_frame_rate": recipe.frame_rate, "default_unit": known[got]}
-    elif recipe.frame_rate is not None or recipe.has_places:
+    elif recipe.frame_rate is not None or recipe.has_metres:
         stated = "states its frame rate and is in metres"
         raise DataError(f"{path}: {stated}; leave frame_rate, unit and scale out")
     elif loader == "vadere":

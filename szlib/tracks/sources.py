@@ -24,7 +24,7 @@ from polars import Float64, Series, String, col
 from ..core.errors import DataError, StorageError
 from ..core.files import temporary_folder
 from ..core.input_files import (
-    explained,
+    explain_errors,
     printable,
     readable_path,
     require_memory,
@@ -33,8 +33,9 @@ from ..core.input_files import (
 from .recipe import SHAPES, Recipe, Shape
 
 LONGEST_LINE = 100_000
-# memory for each byte of a text that is read (measured: 5.8 with its columns), or scanned (1.3 to 1.9)
-_BYTES, SCANNED = 6, 2
+# bytes of memory for each byte of a text: where it is read (measured: 5.8 with its columns), or scanned (1.3
+# to 1.9)
+_READ_FACTOR, SCAN_FACTOR = 6, 2
 _RESERVE = 0.02  # share of a disk that unpacking leaves free
 CONTAINERS = ("PAR1", "ARROW1")  # first letters of Parquet and of Feather
 # What a recipe may say that a scan of rows cannot do: the file is then read as a whole.
@@ -66,9 +67,9 @@ class File:
         return "\n".join(text.splitlines()[:2])
 
     def text(self) -> str:
-        """The text, or the whole lines in its first bytes."""
+        """The text, or the whole lines in its first `size` bytes."""
         if self.size is None:
-            charge(self.plain.stat().st_size, self.path)
+            check_size(self.plain.stat().st_size, self.path)
         with self.plain.open("rb") as stream:
             content = stream.read(self.size)
             if stream.read(1):
@@ -130,7 +131,7 @@ def is_table(source: object) -> bool:
 
 
 @contextmanager
-def opened(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[File]:
+def open_plain(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[File]:
     """Open the file `path`, unpacked where it is packed; `recipe` and `size` are those of `File`.
 
     Raises DataError where it is no regular file, cannot be opened, changes, or packs several files;
@@ -167,8 +168,8 @@ def unpack(plain: Path, path: Path, target: Path) -> None:
     advice = "make room, or name another folder in $TMPDIR"
     damaged = f"{path}: damaged .gz or .zip"
     with (
-        explained(full, advice, StorageError, OSError),
-        explained(damaged, "fetch the file again", faults=damage),
+        explain_errors(full, advice, StorageError, OSError),
+        explain_errors(damaged, "fetch the file again", faults=damage),
         _open_packed(plain, path) as packed,
         target.open("wb") as unpacked,
     ):
@@ -209,12 +210,12 @@ def decode(content: bytes) -> str:
     return content.decode("utf-16" if is_wide else "utf-8-sig", errors="replace")
 
 
-def charge(
-    size: float, where: Path, what: str = "text", factor: float = _BYTES
+def check_size(
+    size: float, where: Path, what: str = "text", factor: float = _READ_FACTOR
 ) -> None:
     """Raise MemoryLimitError where `size` bytes of `where` need more memory than is allowed.
 
-    They need `factor` bytes each; `what` they are stands in the message.
+    Each of them needs `factor` bytes of memory; the message calls them `what`.
     """
     require_memory(factor * size, f"{where}: to read {size / 1e6:,.3g} MB of {what}")
 
@@ -222,7 +223,7 @@ def charge(
 def split_line(line: str, separator: str) -> list[str]:
     """The fields of a `line`; a blank as `separator` stands for any run of blanks.
 
-    None where a quotation mark is not closed.
+    There is none where a quotation mark is not closed.
     """
     if separator == " ":
         return line.replace('"', "").split()
@@ -240,9 +241,9 @@ def find_separator(first: str) -> str:
 
 
 def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> Source:
-    """The text table `file`: each line is a row of `n_fields`, or as many as the first.
+    """The text table `file`: each line is a row of `n_fields` fields, or of as many as the first line has.
 
-    `has_header` says whether the first names the columns; None looks at it.
+    `has_header` says whether the first line names the columns; None: if it has a text that is no number.
     """
     where = file.path
     lines = pl.read_csv(
@@ -291,7 +292,7 @@ def recognise(head: str, path: Path, recipe: Recipe) -> Shape:
     for shape in [recipe.shape] if recipe.file_format else SHAPES.values():
         found = re.match(shape.begins, head, re.MULTILINE)
         named = re.match(shape.file, path.name)
-        is_given = recipe.names_people and "id" in shape.recipe.columns
+        is_given = recipe.has_people and "id" in shape.recipe.columns
         fits = set(shape.header) <= set(fields) and (shape.parse or not is_given)
         if found and named and fits:
             break
@@ -306,7 +307,7 @@ def recognise(head: str, path: Path, recipe: Recipe) -> Shape:
 
 
 def scan_streamed(file: File) -> Rows | None:
-    """Scan a `file` if its shape is streamed and its recipe simple."""
+    """Scan a `file` if its shape is streamed and its recipe simple; None for any other."""
     recipe = file.recipe
     shape = recognise(file.head, file.path, recipe)
     is_simple = not _NOT_STREAMED & recipe.as_json().keys()

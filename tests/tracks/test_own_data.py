@@ -277,7 +277,7 @@ def test_tables_of_a_database_that_do_not_decide_are_refused(tmp_path: Path) -> 
     database.close()
     with pytest.raises(
         szlib.DataError,
-        match=r"several of the tables .* can be tracks; .* sqlite3 -header -csv",
+        match=r"several of the 2 tables can be tracks; .* sqlite3 -header -csv",
     ):
         read_raw(file)
 

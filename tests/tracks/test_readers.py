@@ -34,7 +34,7 @@ from helpers.track_tables import real_data
 import szlib
 from szlib.tracks import funnels
 from szlib.tracks.readers import read_raw
-from szlib.tracks.shapes import SHAPES
+from szlib.tracks.recipe import SHAPES
 
 
 def scaled(factor: float) -> pd.DataFrame:
