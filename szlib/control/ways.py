@@ -513,6 +513,7 @@ class Stamps:
         places = at.tolist()
 
         def are_together(i: int, j: int) -> bool:
+            """True if the people `i` and `j` are of one group, or are near and walk alike."""
             apart = dist(places[i], places[j])
             if None not in (groups[i], groups[j]):
                 return groups[i] == groups[j] and apart < _GROUP_REACH
