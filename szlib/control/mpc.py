@@ -273,9 +273,8 @@ class MPCCBF(Controller):
         ------
         SolverError : a number or a shape cannot be used, or the controller belongs to another thread.
         """
-        began = perf_counter()
+        began, clock = perf_counter(), self._clock
         self._check_thread()
-        clock = self._clock
         clock.tick(now, stamps)
         age = check_number("state_age", state_age)
         x, towards = self._locate(state, check_point("goal", goal), age)
