@@ -57,7 +57,7 @@ from sklearn.neighbors import LocalOutlierFactor
 from studies import plaza_truth, pooled_plazas, real_day
 
 import szlib
-from szlib.plaza import accuracy
+from szlib.plaza import precision_and_recall
 from szlib.plaza.settings import SLOW_INTRUDERS
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
@@ -309,7 +309,7 @@ for ax, (rule, mask) in zip(both, rules.items(), strict=True):
     for who, gone, marker, colour, label in kinds:
         size = 2 if marker == "." else 4
         ax.plot(*turned[who & (mask == gone)].T, marker, color=colour, ms=size, mew=0.8, label=label)
-    found = accuracy.precision_and_recall(mask, intruder)
+    found = precision_and_recall(mask, intruder)
     figures.label_metres(ax, "{}: precision {:.0%}, recall {:.0%}".format(rule, *found))
     ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
 fig.legend(*both[1].get_legend_handles_labels(), loc="outside lower center", ncols=4, markerscale=2)
@@ -323,7 +323,7 @@ for rule, method in zip(rules, ("paper", "hull"), strict=True):
     zone = szlib.SocialZone.fit(people, r_max=r_max, **options)
     errors[rule] = plaza_truth.largest_error(zone, settings)
 by_quota, by_whole = errors.values()
-precision, recall = accuracy.precision_and_recall(whole, intruder)
+precision, recall = precision_and_recall(whole, intruder)
 record.key |= {"encounters: precision": precision, "encounters: recall": recall}
 record.check("the rule for whole encounters finds the intruders", recall > 0.95, f"recall {recall:.0%}")
 what = "the rule for whole encounters removes nobody else"

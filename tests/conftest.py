@@ -36,14 +36,14 @@ def closed_figures() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def sentences_held_by_notebook_10() -> Iterator[None]:
     """The claims that notebook 28 judges are here those of notebook 10."""
-    from szlib.workbook import paper_sentences
+    from szlib.workbook import claims
 
-    table = paper_sentences.load_sentences()
+    table = claims.load_sentences()
     table["held_by"] = [
         [name.replace("28: ", "10: ") for name in names] for names in table["held_by"]
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_sentences, "load_sentences", table.copy)
+        patch.setattr(claims, "load_sentences", table.copy)
         yield
 
 

@@ -76,7 +76,8 @@ from studies.sensitivity import sensitivity
 # %% jupyter={"source_hidden": true}
 # Imports, and the record of the run
 import szlib
-from szlib.workbook import figures, paper_sentences
+from szlib.workbook import figures
+from szlib.workbook.claims import load_sentences
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 from szlib.zones.outliers import is_outlier
 
@@ -748,7 +749,7 @@ record.claim("nobody at Grand Central comes nearer than most strangers keep", ne
 
 # %% jupyter={"source_hidden": true}
 # Checks
-asked = {name for names in paper_sentences.load_sentences()["held_by"] for name in names}
+asked = {name for names in load_sentences()["held_by"] for name in names}
 for row in everywhere.to_dict("records"):
     where = row["data"] if row["method"] == "-" else f"{row['data']}, {row['method']}"
     if f"{record.name[:2]}: {where}: {row['claim']}" in asked:

@@ -47,7 +47,7 @@ from IPython.display import HTML, Markdown, display
 sys.path.append("..")  # for `studies`
 from studies import paper_matrix
 
-from szlib.workbook import claims, figures, paper_sentences
+from szlib.workbook import claims, figures
 from szlib.workbook.record import NotebookRecord
 from szlib.workbook.record.display import style_table
 
@@ -61,7 +61,7 @@ is_ours = verdicts["claim"].str.contains("(ours", regex=False)
 for row in verdicts.to_dict("records"):
     evidence = f"share {row['share']:.2f} ({row['low']:.2f} to {row['high']:.2f}), {row['zones']} zones"
     record.claim(row["claim"], row["verdict"], evidence)
-every = paper_sentences.judge_sentences(paper_sentences.read_checks(record))
+every = claims.judge_sentences(claims.read_checks(record))
 is_stress = every["kind"] == "stress"
 sentences, stress = every[~is_stress].copy(), every[is_stress]
 counts = sentences["verdict"].value_counts()

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from szlib.core.checks import check_columns, check_rows
-from szlib.encounters.samples import SAMPLE_COLUMNS
+from szlib.encounters.occupants import SAMPLE_COLUMNS
 from szlib.tracks.clock import COLUMNS, nearest_tick
 from szlib.workbook.figures.style import (
     BLACK,

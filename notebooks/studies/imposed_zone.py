@@ -24,7 +24,7 @@ from szlib.core.errors import ZoneError
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.kinds import WALKING
 from szlib.encounters.null_model import MINUTES, time_shifted
-from szlib.encounters.samples import SAMPLE_COLUMNS
+from szlib.encounters.occupants import SAMPLE_COLUMNS
 from szlib.encounters.settings import EncounterSettings
 from szlib.tracks import funnels
 from szlib.zones.ellipses import Ellipse

@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 import szlib
 from szlib.core.errors import ZoneError
-from szlib.plaza import accuracy
+from szlib.plaza import precision_and_recall
 from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS
 
 TABLE = "03_outliers"
@@ -70,7 +70,7 @@ def judged(
     close = samples[samples["distance"] <= 2.0].reset_index(drop=True)
     kept = szlib.remove_outliers(close, **rule)
     removed = ~close.index.isin(kept.index)
-    precision, recall = accuracy.precision_and_recall(removed, close["kind"] == "intruder")
+    precision, recall = precision_and_recall(removed, close["kind"] == "intruder")
     try:
         error = plaza_truth.largest_error(szlib.SocialZone.fit(kept, **HULL), settings)
     except ZoneError:  # nothing is left of the zone

@@ -4,10 +4,8 @@ geometry         the area and the attentional space
 areas            an area in any form, or the outline of where people were seen: `as_area`, `walked_area`
 kinds            companions, same direction, opposite, crossing, standing, decided on the common track
 settings         what counts as an encounter: `EncounterSettings`
-occupants        people near each other at one moment, and those inside the attentional space of each row
-finding          the four conditions of the paper: `find_encounters`
-samples          what is measured in a window
-near_rows        the rows of a file that encounters in an area can depend on
+occupants        people near each other at one moment, those in the attentional space of a row, samples
+finding          the four conditions of the paper: `find_encounters`; the rows of a file that they depend on
 days             from the files of days to their encounters, resumable, on one machine or many: `extract_days`
 pairs            every pair of people, and streams that are moved in time: `find_pairs`
 sensor           people that it loses, its noise, and ids that it exchanges: `SensorCheck`
@@ -20,8 +18,8 @@ from .finding import find_encounters
 from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Square
 from .kinds import KINDS, of_kind
 from .null_model import NullEncounters, null_encounters, null_pairs, time_shifted
+from .occupants import SAMPLE_COLUMNS
 from .pairs import find_pairs
-from .samples import SAMPLE_COLUMNS
 from .sensor import SensorCheck
 from .settings import EncounterSettings
 

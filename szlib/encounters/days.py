@@ -41,9 +41,8 @@ from ..tracks.clock import read_tracks, to_clock
 from ..tracks.readers import find_day, find_format, name_recordings, read_raw
 from ..tracks.recipe import Recipe, find_recipe
 from .areas import AUTO, as_area, has_calendar
-from .finding import find_encounters, find_place
+from .finding import find_encounters, find_place, select_near
 from .geometry import Area, AttentionalSpace
-from .near_rows import select_near
 from .settings import EncounterSettings
 
 # Advice by a word of the condition that rejected everything; the last one fits all others.

@@ -1,4 +1,4 @@
-"""People near each other: rows at one moment, and the people in the attentional space of each row."""
+"""People near each other: rows at one moment, people in the attentional space of a row, and their samples."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ import numpy as np
 import pandas as pd
 
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, clock_index
-from .geometry import Area, AttentionalSpace
+from .geometry import Area, AttentionalSpace, wrap_angle
 
+SAMPLE_COLUMNS = [
+    "encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed", "other_los_angle",
+    "other_speed",
+]  # fmt: skip
+"""Columns of a table of samples; the column kind follows them."""
 _AT_ONCE = 500_000  # rows searched at a time
 
 
@@ -164,3 +169,33 @@ def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.
     changed = np.zeros(len(other), bool)
     changed[row[1:]] = (np.diff(rows.piece[row]) == 0) & (np.diff(person) != 0)
     return changed
+
+
+def sample_rows(
+    tracks: pd.DataFrame,
+    rows: TrackRows,
+    encounter: np.ndarray,
+    ref: np.ndarray,
+    other: np.ndarray,
+) -> pd.DataFrame:
+    """Measure two people at the `rows` `ref` and `other` of `tracks`: one row a sample of an `encounter`.
+
+    The time is that of the reference pedestrian: in a shifted crowd they differ.
+    """
+    days = tracks["day"].astype("category")
+    at, ids = rows.order[ref], tracks["id"].to_numpy()
+    seen = rows.place[other] - rows.place[ref]
+    heading, other_heading = (np.angle(rows.velocity[each]) for each in (ref, other))
+    columns = [
+        encounter,
+        days.iloc[at].array,
+        ids[at],
+        ids[rows.order[other]],
+        rows.tick[ref] / TICKS_PER_SECOND,
+        wrap_angle(np.angle(seen) - heading),
+        np.abs(seen),
+        rows.speed[ref],
+        wrap_angle(np.angle(-seen) - other_heading),
+        rows.speed[other],
+    ]
+    return pd.DataFrame(dict(zip(SAMPLE_COLUMNS, columns, strict=True)))

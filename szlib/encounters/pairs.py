@@ -42,8 +42,7 @@ from .kinds import (
     name_kinds,
     of_kind,
 )
-from .occupants import TrackRows, find_neighbours, firsts
-from .samples import sample_rows
+from .occupants import TrackRows, find_neighbours, firsts, sample_rows
 from .sensor import (
     BEFORE,
     NEAR_END,

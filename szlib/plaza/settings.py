@@ -1,4 +1,4 @@
-"""The settings of the synthetic plaza, and the true zone of its people."""
+"""The settings of the synthetic plaza, the true zone of its people, and the precision of a rule."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.checks import Array, require
 from ..core.errors import DataError, ZoneError
@@ -197,3 +198,43 @@ class PlazaSettings:
 def swept_length(speed: float | Array) -> Array:
     """Length of the area that the attentional space sweeps at `speed` within the window [m]."""
     return np.asarray(SPACE.length + speed * _SWEPT)
+
+
+def precision_and_recall(
+    removed: NDArray[np.bool_], intruders: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Compute the precision and recall of a rule that removes intruders.
+
+    Parameters
+    ----------
+    removed : whether the rule removed each sample (or encounter), shape (n,).
+    intruders : whether each is an intruder's, shape (n,).
+
+    Returns
+    -------
+    The share of intruders among the removed, and the share of the intruders that is removed; nan for a share
+    of nothing.
+
+    Raises
+    ------
+    DataError : the shapes differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.plaza import precision_and_recall
+    >>> precision_and_recall(np.array([True, True, False]), np.array([True, False, False]))
+    (0.5, 1.0)
+    """
+    removed = np.asarray(removed, bool)
+    intruders = np.asarray(intruders, bool)
+    if removed.shape != intruders.shape:
+        raise DataError(
+            f"expected two arrays of one shape; got {removed.shape} and {intruders.shape}"
+        )
+    found = removed & intruders
+    precision, recall = (
+        float(found[each].mean()) if each.any() else np.nan
+        for each in (removed, intruders)
+    )
+    return precision, recall

@@ -1,4 +1,4 @@
-"""Verdicts on the claims of the paper.
+"""Verdicts on the claims of the paper, and on each of its sentences that can be checked.
 
 A claim is judged in many conditions: with each zone that was drawn, each controller or chain of methods, in
 each scenario. Its *share* is that of conditions and draws in which it holds. Zones are drawn at random,
@@ -11,18 +11,28 @@ there are zones. That is cautious: a zone that holds in a part of the conditions
     depends on the condition    it contains one half, with as many zones or more
     mostly not supported        it lies below one half
     not supported               it lies at or below 10 %
+
+The sentences are in paper_sentences.toml, which describes its fields.  The verdict of each is computed from
+the checks and claims that the notebooks of a run recorded.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from scipy.stats import beta
 
 from ..core.checks import check_columns, require
+from ..core.input_files import read_json_object
+from .record.display import format_result
+from .record.notebook_record import NotebookRecord
 
+SENTENCES = Path(__file__).with_name("paper_sentences.toml")
+Checks = Mapping[str, Mapping[str, Any]]
 VERDICTS = (
     "not supported",
     "mostly not supported",
@@ -148,9 +158,7 @@ def _find_deciding_factor(cells: pd.DataFrame) -> str:
     return text if difference >= DECISIVE else ""
 
 
-def judge(
-    kind: str, names: Sequence[str], checks: Mapping[str, Mapping[str, Any]]
-) -> str:
+def judge(kind: str, names: Sequence[str], checks: Checks) -> str:
     """The verdict on a sentence of this `kind`, from the `checks` of a run that have these `names`.
 
     Tests among the names do not count: a run does not execute them. A sentence that only tests hold says so.
@@ -174,3 +182,62 @@ def _read_result(check: Mapping[str, Any]) -> str:
         if check["result"].startswith(verdict):
             return verdict
     return "supported" if check["passed"] else "not supported"
+
+
+def load_sentences() -> pd.DataFrame:
+    """Read the sentences: one row for each, with the fields of paper_sentences.toml.
+
+    Examples
+    --------
+    >>> from szlib.workbook.claims import load_sentences
+    >>> load_sentences()["place"].iloc[0]
+    'abstract'
+    """
+    text = SENTENCES.read_text(encoding="utf-8")
+    return pd.DataFrame(tomllib.loads(text)["sentence"])
+
+
+def read_checks(record: NotebookRecord) -> Checks:
+    """The checks of a `record`, and those of other notebooks in its folder, by "NN: name"."""
+    files = sorted((record.out / "records").glob("*.json"))
+    records = {file.stem: read_json_object(file)["checks"] for file in files}
+    records[record.name] = record.checks
+    return {
+        f"{notebook.split('_')[0]}: {check['name']}": check
+        for notebook, made in records.items()
+        for check in made
+    }
+
+
+def judge_sentences(checks: Checks) -> pd.DataFrame:
+    """The sentences with their verdicts in a run.
+
+    Parameters
+    ----------
+    checks : of the run, by "NN: name", as of `read_checks`.
+
+    Returns
+    -------
+    The table of `load_sentences` with the columns verdict, numbers (each check with its result and value, one
+    a line) and unknown (checks that were not made, although their notebook made others).
+    """
+    made_in = {name.split(": ")[0] for name in checks}
+    rows = load_sentences().to_dict("records")
+    for row in rows:
+        names = row["held_by"]
+        row["verdict"] = judge(row["kind"], names, checks)
+        row["numbers"] = "\n".join(_describe(name, checks) for name in names)
+        row["unknown"] = [
+            name
+            for name in names
+            if name not in checks and name.split(": ")[0] in made_in
+        ]
+    return pd.DataFrame(rows)
+
+
+def _describe(name: str, checks: Checks) -> str:
+    """The check of a `name` with its result and value, or its name alone."""
+    if name not in checks:
+        return name
+    check = checks[name]
+    return f"{name}: {format_result(check['result'], check['value'])}"

@@ -173,7 +173,6 @@ def _run(options: argparse.Namespace) -> int:
         parameters["reading"] = reading
     from .folders import require_place
     from .runner import run
-    from .summary import format_summary, write_junit
 
     junit = require_place(Path(options.junit)) if options.junit else None
     summary = run(
@@ -185,6 +184,8 @@ def _run(options: argparse.Namespace) -> int:
         notebooks=options.notebooks,
         figures=options.figures,
     )
+    from .report import format_summary, write_junit
+
     print(format_summary(summary))
     if junit:
         write_junit(summary, junit)

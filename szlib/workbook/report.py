@@ -1,5 +1,7 @@
 """The report of a run: a front page and every executed notebook in one HTML file that needs no network.
 
+The summary of a run is also text for a terminal, and JUnit XML for services that run tests.
+
 nbconvert, with which Jupyter itself exports, makes the page. The template and the renderer of this module
 draw formulas as MathML, and fold the code. Only the run that wrote the notebooks makes their report.
 """
@@ -10,29 +12,31 @@ import io
 import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from os.path import relpath
 from pathlib import Path
 from typing import Any
 
 import nbformat
 import pandas as pd
-from jinja2 import FileSystemLoader
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from traitlets.config import Config
 
 from ..core.files import write_file
+from ..core.input_files import printable
 from ..plaza.settings import PlazaSettings
 from ..simulation import SCENARIOS
 from ..tracks import datasets, funnels
 from . import folders
-from .claims import NOT_RUN
+from .claims import NOT_RUN, judge_sentences
 from .figures.movies import read_scripts
-from .paper_sentences import judge_sentences
 from .record.data_cache import read_stored_zone
+from .record.display import format_value
 from .record.parameters import ZoneMethod
-from .summary import STATIC, fill_template
 
+STATIC = Path(__file__).parent / "static"  # templates, and what a browser shows
 # The kinds of outputs that are shown, the first of them that an output has.
 _OUTPUTS = ["text/html", "text/markdown", "image/png", "image/jpeg", "text/plain"]
 # The text of a link to another file, and the name of the file without folder and ending.
@@ -203,3 +207,31 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
             "size": table.set_index("speed").loc[speed].to_dict(),
         }
     return texts
+
+
+def format_summary(summary: Mapping[str, Any]) -> str:
+    """Format the `summary` of a run: a row for each notebook, what does not hold, the report, the verdict."""
+    return fill_template("summary.txt.j2", **summary)
+
+
+def write_junit(summary: Mapping[str, Any], file: Path) -> None:
+    """Write the `summary` of a run as JUnit XML to `file`: a suite for each notebook, a case for each check.
+
+    The first case of a suite is the notebook itself.  Raises StorageError.
+    """
+    write_file(file, fill_template("junit.xml.j2", **summary))
+
+
+def fill_template(name: str, **variables: Any) -> str:
+    """The template of this `name` in the folder `static`, with `variables`; HTML and XML are escaped."""
+    pages = Environment(
+        loader=FileSystemLoader(STATIC),
+        autoescape=not name.endswith(".txt.j2"),
+        undefined=StrictUndefined,
+    )
+    pages.filters |= {
+        "printable": printable,
+        "value": format_value,
+        "relative": relpath,
+    }
+    return pages.get_template(name).render(variables)

@@ -32,8 +32,8 @@ below 3.84, with L the best over the rest: the 95 % quantile of chi square with 
 least `_MODEL_ERROR` wide on both sides. It is meant to contain the true radius. In 30 crowds that swerve
 around circles of 0.5, 0.8 and 1.0 m it does, and R is right to 1 cm; in 8 that keep circles by ORCA, whose
 edge is sharp, it does, and R is up to 2 cm too small. Noise is not in the model, and the nearest of several
-noisy distances is too near. So the radius comes from smoothed paths (`szlib.zones.smoothing`). What is left
-of 5 cm of noise at 10 Hz makes R 2 to 3 cm too small, of 10 cm 5 to 8 cm (9 and 15 cm without smoothing).
+noisy distances is too near. So the radius comes from smoothed paths (`smooth_paths`). What is left of 5 cm
+of noise at 10 Hz makes R 2 to 3 cm too small, of 10 cm 5 to 8 cm (9 and 15 cm without smoothing).
 """
 
 from __future__ import annotations
@@ -54,8 +54,7 @@ from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
 from ..encounters.sensor import SensorCheck
 from .outliers import R_MAX, nearest_approaches
-from .respect_likelihood import EXCESS_PRIOR, respect_factor
-from .smoothing import smooth_paths
+from .respect_likelihood import EXCESS_PRIOR, respect_factor, smooth_paths
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)

@@ -16,7 +16,7 @@ import szlib
 from szlib.encounters import occupants
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.geometry import Area, AttentionalSpace, Square, wrap_angle
-from szlib.encounters.samples import SAMPLE_COLUMNS
+from szlib.encounters.occupants import SAMPLE_COLUMNS
 from szlib.tracks import funnels
 
 AHEAD, AROUND = AttentionalSpace(), AttentionalSpace(centred=True)

@@ -16,7 +16,7 @@ from helpers.raw_days import (
 )
 
 import szlib
-from szlib.encounters.near_rows import select_near
+from szlib.encounters.finding import select_near
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from szlib.encounters.geometry import Square, wrap_angle
-from szlib.encounters.samples import SAMPLE_COLUMNS
+from szlib.encounters.occupants import SAMPLE_COLUMNS
 
 ROOM = Square(x=(-20, 20), y=(-20, 20))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.encounters.near_rows import select_near
+from szlib.encounters.finding import select_near
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
 from szlib.tracks.readers import read_raw

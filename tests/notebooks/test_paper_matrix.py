@@ -10,7 +10,7 @@ from studies.atlas import REFERENCE
 from studies.plaza_truth import true_kinds
 
 import szlib
-from szlib.plaza import accuracy
+from szlib.plaza import precision_and_recall
 from szlib.workbook.claims import judge_claims
 from szlib.workbook.record import read_table
 from szlib.zones import outliers
@@ -123,7 +123,7 @@ def test_outliers_of_a_plaza_are_judged_by_its_truth():
     removed = outliers.is_outlier(close, fraction=0.002, n_neighbours=20)
     truth = true_kinds(close, seed=3) == "intruder"
     found = paper_matrix.judge_outliers(samples, "the paper's", 3)
-    precision = accuracy.precision_and_recall(removed, truth)[0]
+    precision = precision_and_recall(removed, truth)[0]
     assert found["intruders_removed"] == pytest.approx(precision, abs=5e-4)
     near = (close["distance"] < 1.0).to_numpy()
     assert found["edge_removed"] == (removed & near & ~truth).sum()

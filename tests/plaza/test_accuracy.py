@@ -11,7 +11,7 @@ from studies import plaza_truth
 from studies.pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
 
 import szlib
-from szlib.plaza import accuracy, generation, stage_encounters
+from szlib.plaza import generation, precision_and_recall, stage_encounters
 from szlib.workbook.record import read_table
 
 TOO_FAR, TOO_FAR_WITH_MANY = 0.035, 0.05
@@ -57,19 +57,15 @@ def test_precision_and_recall() -> None:
         np.array([1, 1, 1, 0, 0], bool),
         np.array([1, 0, 0, 1, 0], bool),
     )
-    assert accuracy.precision_and_recall(removed, intruders) == pytest.approx(
-        (1 / 3, 1 / 2)
-    )
-    assert accuracy.precision_and_recall(intruders, removed) == pytest.approx(
-        (1 / 2, 1 / 3)
-    )
-    assert accuracy.precision_and_recall(removed, removed) == (1, 1)
-    precision, recall = accuracy.precision_and_recall(np.zeros(5, bool), intruders)
+    assert precision_and_recall(removed, intruders) == pytest.approx((1 / 3, 1 / 2))
+    assert precision_and_recall(intruders, removed) == pytest.approx((1 / 2, 1 / 3))
+    assert precision_and_recall(removed, removed) == (1, 1)
+    precision, recall = precision_and_recall(np.zeros(5, bool), intruders)
     assert np.isnan(precision)
     assert recall == 0
-    assert np.isnan(accuracy.precision_and_recall(removed, np.zeros(5, bool))[1])
+    assert np.isnan(precision_and_recall(removed, np.zeros(5, bool))[1])
     with pytest.raises(szlib.DataError, match=r"got \(5,\) and \(4,\)"):
-        accuracy.precision_and_recall(removed, intruders[1:])
+        precision_and_recall(removed, intruders[1:])
 
 
 def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:

@@ -17,7 +17,7 @@ from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
 from szlib.tracks.readers import read_raw
 from szlib.workbook.cli import main
-from szlib.workbook.summary import format_summary
+from szlib.workbook.report import format_summary
 
 
 def table() -> pd.DataFrame:

@@ -10,7 +10,7 @@ import pytest
 from helpers.junit_schema import violations
 
 from szlib.workbook.cli import main
-from szlib.workbook.summary import write_junit
+from szlib.workbook.report import write_junit
 
 pytestmark = pytest.mark.usefixtures("without_kernels")
 GOOD = 'record.check("sum", True, 2)\nrecord.claim("paper", False, 0.25)'

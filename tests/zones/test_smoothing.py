@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from helpers.passers import passers
 
-from szlib.zones.smoothing import smooth_paths
+from szlib.zones.respect_likelihood import smooth_paths
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from szlib.plaza.accuracy import precision_and_recall
+from szlib.plaza import precision_and_recall
 from szlib.zones.outliers import N_NEIGHBOURS, complementary_points, local_outlier_factors
 
 from .task import Args, Rng, check_form, make_task, repeat
