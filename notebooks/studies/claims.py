@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from scipy.stats import t as student_t
 from studies import paper_claims as claims
 from studies import quantile_zone, sites
-from studies.committed import study, write_table
+from studies.committed import NULL_MODELS, read_arguments, study, write_table
 from studies.plaza_truth import true_kinds
 from studies.pooling import pool
 from studies.respect import stored
@@ -300,12 +300,9 @@ def draw_verdicts(answers: pd.DataFrame) -> Figure:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("study", choices=["claims", "sensitivity"])
-    parser.add_argument("--sites", nargs="+", default=list(SITES))
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--cache", type=Path, default=Path("../results/null"), help="of null models")
-    asked = parser.parse_args()
+    asked = read_arguments(
+        __doc__, study=("claims", "sensitivity"), sites=list(SITES), jobs=1, cache=NULL_MODELS
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)  # the tables say what is not adequate
         if asked.study == "claims":

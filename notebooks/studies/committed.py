@@ -5,6 +5,7 @@ A table has the command, the seed and the commit that made it. `STUDIES` has eve
 
 from __future__ import annotations
 
+import argparse
 import json
 import shlex
 import subprocess
@@ -34,6 +35,10 @@ class Study:
 
 
 STUDIES: dict[str, Study] = {}
+NULL_MODELS = Path("../results/null")
+"""Where null models are kept from one run of a study to the next."""
+WORLDS = Path("../results/rollouts")
+"""Where finished worlds are kept, so that a study that was stopped goes on."""
 
 
 def study(*tables: str, notebook: str, has_probe: bool = True) -> Callable[[Any], Any]:
@@ -62,6 +67,25 @@ def write_table(table: pd.DataFrame, name: str, *, seed: int = 0) -> None:
     header = json.dumps({"command": command, "seed": seed, "commit": _describe_commit()})
     text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
     write_file(TABLES / f"{name}.csv", f"# {header}\n{text}")
+
+
+def read_arguments(description: str | None, **options: Any) -> argparse.Namespace:
+    """Read the arguments of a study's command, which `description` explains.
+
+    An option ``--name`` has its default, or several in a list. A type or a tuple of choices is an argument by place.
+    """
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawTextHelpFormatter)
+    for name, value in options.items():
+        if isinstance(value, type):
+            parser.add_argument(name, type=value)
+        elif isinstance(value, tuple):
+            parser.add_argument(name, choices=value)
+        else:
+            first = value[0] if isinstance(value, list) else value
+            many = "+" if isinstance(value, list) else None
+            flag = "--" + name.replace("_", "-")
+            parser.add_argument(flag, default=value, type=type(first), nargs=many, help=f"default: {value}")
+    return parser.parse_args()
 
 
 def _describe_commit() -> str:

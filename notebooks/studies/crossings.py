@@ -13,7 +13,6 @@ which are not in it.
 
 from __future__ import annotations
 
-import argparse
 from itertools import product
 from math import hypot
 
@@ -21,7 +20,7 @@ import numpy as np
 import pandas as pd
 import pyrvo
 from scipy.stats import binomtest
-from studies.committed import study, write_table
+from studies.committed import read_arguments, study, write_table
 
 import szlib
 from szlib.control.controller import Controller, advance
@@ -181,6 +180,4 @@ def main(n: int) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--n", type=int, default=WORLDS, help="number of worlds")
-    main(parser.parse_args().n)
+    main(read_arguments(__doc__, n=WORLDS).n)

@@ -1,7 +1,7 @@
 """Robots among other people's crowds, real and simulated: the tables of notebook 29.
 
 python -m studies.crowd_trials           both tables, as they are saved: some 15 min on one core
-python -m studies.crowd_trials --n 10    at most 10 trials of each kind
+python -m studies.crowd_trials --n 10    at most 10 trials of each kind; with --work FOLDER it goes on from there
 
 29_crowds.csv     means with 95 % intervals: crowd by what people see by controller
 29_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what the people did
@@ -12,7 +12,6 @@ model is left out where JuPedSim is not installed (`INSTALL_JUPEDSIM` in tests/h
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -26,7 +25,7 @@ import numpy as np
 import pandas as pd
 from studies import quantile_zone
 from studies.claims import SITES
-from studies.committed import study, write_table
+from studies.committed import read_arguments, study, write_table
 from studies.replay import ReplacedWalker, Replays, find_replays
 from studies.safety_claims import MOTION_CHANGES, safety_violations
 from studies.social_metrics import compute_replay_metrics
@@ -257,10 +256,5 @@ def main(n: int, work: Path | None) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--n", type=int, default=10**6, help="at most so many trials of each kind")
-    parser.add_argument("--work", type=Path, help="folder of finished chunks, to go on from")
-    given = parser.parse_args()
-    main(given.n, given.work)
+    given = read_arguments(__doc__, n=10**6, work="")
+    main(given.n, Path(given.work) if given.work else None)

@@ -8,13 +8,12 @@ along its arcs, ten times within each step, and Euclidean distances to zones, bo
 there. Finished worlds are kept in results/rollouts, so that a run that was stopped goes on.
 """
 
-import argparse
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from studies.committed import study, write_table
+from studies.committed import WORLDS, read_arguments, study, write_table
 from studies.distances import euclidean_to_ellipse, euclidean_to_segment
 
 import szlib
@@ -170,13 +169,7 @@ def recompute(row: pd.Series) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--worlds", type=int, default=2000, help="worlds of each set")
-    parser.add_argument("--jobs", type=int, default=-1, help="processes")
-    parser.add_argument("--out", default="../results/rollouts", help="where finished worlds are kept")
-    parser.add_argument("--robots", nargs="+", default=TABULATED, choices=ROBOTS, help="which robots")
-    parser.add_argument("--sets", nargs="+", default=list(SETS), choices=SETS, help="which worlds")
-    given = parser.parse_args()
+    given = read_arguments(__doc__, worlds=2000, jobs=-1, out=WORLDS, robots=TABULATED, sets=list(SETS))
     options = {"seed": FIRST, "out": given.out, "n_jobs": given.jobs}
     lines = []
     for name in given.sets:

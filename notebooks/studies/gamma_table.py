@@ -6,12 +6,11 @@ Writes notebooks/tables/09_gamma.csv: a row for each gamma, all of them in the s
 Clopper-Pearson intervals. Finished worlds are kept in results/rollouts, so that a run that was stopped goes on.
 """
 
-import argparse
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from studies.committed import study, write_table
+from studies.committed import WORLDS, read_arguments, study, write_table
 
 import szlib
 from szlib.control.settings import TOLERANCE
@@ -58,11 +57,7 @@ def recompute(row: pd.Series) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--worlds", type=int, default=2000, help="number of worlds")
-    parser.add_argument("--jobs", type=int, default=-1, help="processes")
-    parser.add_argument("--out", default="../results/rollouts", help="where finished worlds are kept")
-    given = parser.parse_args()
+    given = read_arguments(__doc__, worlds=2000, jobs=-1, out=WORLDS)
     lines = []
     for gamma in GAMMAS:
         rows = drive(gamma, given.worlds, out=given.out, n_jobs=given.jobs)

@@ -8,7 +8,6 @@ replaced crosses groups, too.  The real data is looked for in $SZLIB_DATA_DIR.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -16,7 +15,7 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 from studies.claims import DATA
-from studies.committed import study, write_table
+from studies.committed import read_arguments, study, write_table
 from studies.replay import RecordedPerson, ReplacedWalker, Replay
 from studies.sites import read_groups, read_magni_groups
 from studies.social_metrics import compute_replay_metrics
@@ -128,8 +127,4 @@ def main(n: int) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--n", type=int, default=200, help="at most so many ways at each site")
-    main(parser.parse_args().n)
+    main(read_arguments(__doc__, n=200).n)

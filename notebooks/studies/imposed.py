@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from studies import quantile_zone
-from studies.committed import study, write_table
+from studies.committed import NULL_MODELS, read_arguments, study, write_table
 from studies.imposed_zone import PairedSamples
 from studies.respect import data_and_null
 
@@ -43,12 +43,7 @@ SHIFTS_DRAWN = {"grand-central": 1, "atc-1hz": 12, "plaza": 4}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("draws", type=int)
-    parser.add_argument("--sites", nargs="+", default=list(SIZES))
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--cache", type=Path, default=Path("../results/null"))
-    asked = parser.parse_args()
+    asked = read_arguments(__doc__, draws=int, sites=list(SIZES), jobs=1, cache=NULL_MODELS)
     table = pd.DataFrame(coverage(asked))
     write_table(table, "25_imposed")
     print(table.to_string())

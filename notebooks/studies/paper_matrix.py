@@ -13,7 +13,6 @@ stopped goes on. Two hours on one core.
 
 from __future__ import annotations
 
-import argparse
 import json
 import tempfile
 import textwrap
@@ -31,7 +30,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from studies.claims import SITES
-from studies.committed import study, write_table
+from studies.committed import read_arguments, study, write_table
 from studies.lesson_zones import WIDEST
 from studies.plaza_truth import true_kinds
 
@@ -369,11 +368,7 @@ def _draw_shares(ax: Axes, cells: pd.DataFrame, factor: str, levels: list[str], 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("table", choices=["zones", "robots"])
-    parser.add_argument("--draws", type=int, default=DRAWS)
-    parser.add_argument("--jobs", type=int, default=2)
-    asked = parser.parse_args()
+    asked = read_arguments(__doc__, table=("zones", "robots"), draws=DRAWS, jobs=2)
     warnings.simplefilter("ignore", szlib.DataWarning)
     if asked.table == "zones":
         draws = range(1, asked.draws + 1)

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from studies import quantile_zone
-from studies.committed import study, write_table
+from studies.committed import NULL_MODELS, read_arguments, study, write_table
 from studies.respect import stored
 
 import szlib
@@ -48,9 +48,7 @@ FIRST_SEED = 3000
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--cache", type=Path, default=Path("../results/null"), help="of null models")
-    asked = parser.parse_args()
+    asked = read_arguments(__doc__, cache=NULL_MODELS)
     table = pd.DataFrame(row for case in CASES for row in describe_case(case, asked))
     write_table(table, "25_plazas")
     print(table.to_string())

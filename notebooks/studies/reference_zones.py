@@ -10,10 +10,10 @@ from __future__ import annotations
 import argparse
 import json
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from studies.committed import NULL_MODELS, read_arguments
 from studies.respect import data_and_null, load
 
 import szlib
@@ -39,10 +39,7 @@ SOURCES = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--cache", type=Path, default=Path("../results/null"))
-    asked = parser.parse_args()
+    asked = read_arguments(__doc__, jobs=1, cache=NULL_MODELS)
     zones = {name: fit(site) for name, (site, _, _) in SOURCES.items()}
     entries = {name: describe(name, zone) for name, zone in zones.items()}
     entries["atc-paper"] = describe_paper(asked, None)

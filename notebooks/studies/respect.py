@@ -24,7 +24,7 @@ import joblib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from studies.committed import study, write_table
+from studies.committed import NULL_MODELS, read_arguments, study, write_table
 from studies.noninteracting_crowd import noninteracting_crowd
 from studies.sites import GRAND_CENTRAL_RATE, read_grand_central
 
@@ -59,17 +59,10 @@ SIZES = (36, 72, 150, 300, 600, 1200, 2400, 4800)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("study", choices=["nobody", "sites", "n-curve", "changes"])
-    parser.add_argument("--seeds", type=int, default=100)
-    parser.add_argument("--sites", nargs="+", default=["atc-1hz", "grand-central", "plaza"])
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument(
-        "--cache", type=Path, default=Path("../results/null"), help="where null models are stored"
-    )
-    asked = parser.parse_args()
-    make = {"nobody": nobody, "sites": sites, "n-curve": n_curve, "changes": changes}[asked.study]
-    table = pd.DataFrame(make(asked))
+    studies = {"nobody": nobody, "sites": sites, "n-curve": n_curve, "changes": changes}
+    places = ["atc-1hz", "grand-central", "plaza"]
+    asked = read_arguments(__doc__, study=tuple(studies), seeds=100, sites=places, jobs=2, cache=NULL_MODELS)
+    table = pd.DataFrame(studies[asked.study](asked))
     write_table(table, f"06_{asked.study.replace('-', '_')}")
     print(table.to_string())
 

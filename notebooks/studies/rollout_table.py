@@ -8,13 +8,12 @@ controller, by IPOPT, takes ten times as long and drives in the first worlds of 
 kept in results/rollouts, so that a run that was stopped goes on. Half an hour on one core.
 """
 
-import argparse
 from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
-from studies.committed import study, write_table
+from studies.committed import WORLDS, read_arguments, study, write_table
 
 import szlib
 from szlib.control.settings import TOLERANCE
@@ -101,13 +100,7 @@ def recompute(row: pd.Series) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--blocks", type=int, default=4, help="blocks of fresh seeds")
-    parser.add_argument("--worlds", type=int, default=500, help="worlds in a block")
-    parser.add_argument("--paper-worlds", type=int, default=250, help="of these, by the paper's controller")
-    parser.add_argument("--jobs", type=int, default=-1, help="processes")
-    parser.add_argument("--out", default="../results/rollouts", help="where finished worlds are kept")
-    given = parser.parse_args()
+    given = read_arguments(__doc__, blocks=4, worlds=500, paper_worlds=250, jobs=-1, out=WORLDS)
     tables: dict[tuple[str, str], list[pd.DataFrame]] = {}
     for name, (worlds, formulations) in SETS.items():
         for block in range(given.blocks):

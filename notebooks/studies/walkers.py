@@ -13,7 +13,6 @@ the solver, so that it is the same on every machine.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -21,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 from studies.claims import SITES
-from studies.committed import study, write_table
+from studies.committed import read_arguments, study, write_table
 from studies.crowd_trials import zone_of
 from studies.replay import TIME_FACTOR, ReplacedWalker, Replay, find_replays
 from studies.social_metrics import REACHED, compute_replay_metrics
@@ -162,8 +161,4 @@ def main(n: int) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--n", type=int, default=40, help="at most so many ways at each site")
-    main(parser.parse_args().n)
+    main(read_arguments(__doc__, n=40).n)

@@ -36,3 +36,18 @@ def test_a_table_is_made_by_its_module_and_shown_in_its_notebook(name):
 def test_a_table_that_no_study_registered_is_not_written():
     with pytest.raises(KeyError, match="16_claims: register the table with @study"):
         committed.write_table(pd.DataFrame(), "16_claims")
+
+
+def test_the_arguments_of_a_study_have_their_defaults_and_types(monkeypatch):
+    options = {
+        "study": ("claims", "zones"),
+        "n": int,
+        "sites": ["a", "b"],
+        "paper_worlds": 2,
+    }
+    typed = ["zones", "5", "--sites", "c", "d", "--paper-worlds", "7"]
+    monkeypatch.setattr("sys.argv", ["python", *typed])
+    asked = vars(committed.read_arguments("", **options))
+    assert asked == {"study": "zones", "n": 5, "sites": ["c", "d"], "paper_worlds": 7}
+    monkeypatch.setattr("sys.argv", ["python", "claims", "5"])
+    assert committed.read_arguments("", **options).sites == ["a", "b"]
