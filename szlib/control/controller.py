@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..core.checks import Array, require
 from ..core.errors import SolverError
 from .obstacles import Path
-from .people import Person, check_time
+from .people import Person, check_finite
 from .settings import MPCSettings
 
 
@@ -245,7 +245,7 @@ class StepClock:
             )
         last, called = self.now, perf_counter()
         if now is not None:
-            self.now = check_time(now)
+            self.now = check_finite("now", now)
         elif self.has_begun:
             self.now += self._dt
         self._back = max(0.0, last - self.now) * self.has_begun

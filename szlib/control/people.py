@@ -6,9 +6,9 @@ A sensor is noisy and late, and loses people. By the ids of people,
                 before that, and for people without an id whenever they are slower
     position    is moved forward to now at constant velocity, for people who were seen earlier
     unseen      people stay, at constant velocity, for `memory` seconds
-    rejected    are measurements that are not finite, or beyond `LARGEST`, or measured more than `memory`
-                before or after now. The last known state of the same id takes their place, moved forward;
-                people without such a state are *unknown*
+    rejected    are measurements with a number that is not finite, or farther than `LARGEST`, and those from
+                more than `memory` before or after now. The last known state of the same id takes their place,
+                moved forward; people without such a state are *unknown*
     late        measurements, older than what is known of the same id, are ignored
     ids         that are NaN, or given to two people at once, tell nothing. If a person is more than
                 `SAME_PERSON` from where the same id is expected, they are somebody else
@@ -21,9 +21,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from math import atan2, dist, hypot, inf, isfinite
+from math import atan2, dist, hypot, inf
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -59,21 +60,19 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
     ZoneError if it is none, reaches beyond `LARGEST`, or does not contain the person's position. It may be
     smaller than a body, as a measured zone may be: `Step.safe` keeps the robot off bodies besides.
     """
-    found = zone if isinstance(zone, Ellipse) else getattr(zone, "ellipse", None)
+    found = getattr(zone, "ellipse", zone)
     if callable(found):
         found = found(speed)
-    if not isinstance(found, Ellipse):
-        raise ZoneError(
-            f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}"
-        )
-    is_near = max(*map(abs, found.center), found.semi_axes[0]) <= LARGEST
-    require(is_near, "a zone", found, f"within {LARGEST:g} m of its person", ZoneError)
-    xa, ya, xb, yb, a = found.foci_and_axis
-    if hypot(xa, ya) + hypot(xb, yb) > 2 * a * (1 + 1e-9):
-        raise ZoneError(
-            f"a zone must contain its person, who is at (0, 0) of its frame; got {found}"
-        )
-    return found
+    if isinstance(found, Ellipse):
+        reach = max(*map(abs, found.center), found.semi_axes[0])
+        if reach <= LARGEST:
+            xa, ya, xb, yb, a = found.foci_and_axis
+            if hypot(xa, ya) + hypot(xb, yb) <= 2 * a * (1 + 1e-9):
+                return found
+    raise ZoneError(
+        f"a zone must contain its person, who is at (0, 0) of its frame, reach no farther than "
+        f"{LARGEST:g} m, and be an Ellipse or have .ellipse(speed); got {found!r}"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,19 +110,20 @@ class Prediction:
     spread: Any = 0.0
 
     def __post_init__(self) -> None:
-        name = "the times of a prediction"
-        times = check_array(name, self.times, (...,))
-        n, expected = times.size, "positive and increasing, shape (T,)"
-        is_later = times.shape == (n,) and (np.diff(times, prepend=0.0) > 0).all()
-        require(n and is_later, name, self.times, expected, SolverError)
+        times = check_array("the times of a prediction", self.times, (...,)).ravel()
+        n = times.size
         positions = check_array("the positions of a prediction", self.positions, (n, 2))
-        name = "the spread of a prediction"
-        spread = check_array(name, self.spread, (...,))
-        if spread.shape == (n, 2, 2):
+        spread = check_array("the spread of a prediction", self.spread, (...,))
+        if spread.shape[1:] == (2, 2):
             spread = np.sqrt(np.linalg.norm(spread, ord=2, axis=(1, 2)))
+        is_later = (np.diff(times, prepend=0.0) > 0).all()
         is_spread = spread.shape in ((), (n,)) and (spread >= 0).all()
-        expected = f"at least 0: a number, or of shape ({n},) or ({n}, 2, 2)"
-        require(is_spread, name, self.spread, expected, SolverError)
+        expected = (
+            "of times that are positive and increasing, with a spread of at least 0: a number, or of shape "
+            f"({n},) or ({n}, 2, 2)"
+        )
+        given = self.times, self.spread
+        require(is_later and is_spread, "a prediction", given, expected, SolverError)
         spread = np.broadcast_to(spread, n)
         vars(self).update(times=times, positions=positions, spread=spread)
 
@@ -132,8 +132,9 @@ class Prediction:
         steady = np.add(person.position, np.outer(self.times, person.velocity))
         offsets = np.column_stack([self.positions - steady, SPREAD * self.spread])
         knots = np.r_[0.0, self.times]
-        rows = [np.interp(times, knots, np.r_[0.0, each]) for each in offsets.T]
-        return np.column_stack(rows)
+        return np.column_stack(
+            [np.interp(times, knots, np.r_[0.0, each]) for each in offsets.T]
+        )
 
     def later(self, seconds: float) -> Prediction | None:
         """The same prediction for the person `seconds` later; None if nothing of it is left."""
@@ -146,10 +147,10 @@ class Prediction:
 
 def list_knots(person: Person, settings: MPCSettings) -> Array:
     """What a `PredictedZone` of a `person` needs for each interval of the horizon of these `settings`."""
-    times, rates = np.array(settings.times), np.zeros((settings.N, 3))
+    times, offsets = np.array(settings.times), np.zeros((settings.N + 1, 3))
     if person.prediction is not None:
         offsets = person.prediction.sample(person, times)
-        rates = np.diff(offsets, axis=0) / np.diff(times)[:, None]
+    rates = np.diff(offsets, axis=0) / np.diff(times)[:, None]
     return np.column_stack([times[1:], rates]).ravel()
 
 
@@ -180,20 +181,16 @@ def predict(
     >>> one.after(1.0).position
     (1.0, 0.2)
     """
-    rows = check_array("people", people, (..., 4))
-    require(rows.ndim == 2, "people", rows.shape, "of shape (n, 4)", SolverError)
-    positions = check_array("positions", positions, (...,))
-    spreads = check_array("spread", spread, (...,))
-    spreads = spreads if spreads.ndim else np.full(len(rows), spread)
-    for name, given in (("positions", positions), ("spread", spreads)):
-        is_each = given.shape[:1] == (len(rows),)
-        expected = f"one for each of {len(rows)} people"
-        require(is_each, name, given.shape, expected, SolverError)
+    rows = check_array("people", people, (..., 4)).reshape(-1, 4).tolist()
+    n, spreads = len(rows), check_array("spread", spread, (...,))
+    positions = check_array("positions", positions, (n, np.size(times), 2))
+    if not spreads.ndim:
+        spreads = np.full(n, spread)
+    expected = f"a number, or one for each of {n} people"
+    require(len(spreads) == n, "spread", spreads.shape, expected, SolverError)
     return [
         Person((x, y), (vx, vy), prediction=Prediction(times, xy, own))
-        for (x, y, vx, vy), xy, own in zip(
-            rows.tolist(), positions, spreads, strict=True
-        )
+        for (x, y, vx, vy), xy, own in zip(rows, positions, spreads, strict=True)
     ]
 
 
@@ -209,7 +206,7 @@ class Person:
         None if they stand, or with `heading_unknown`; then the circle around their zone is used.
     zone : their social zone, in their own frame; None: the controller's.
     id : by which a `Tracker` recognises them; None: they are new at each step.
-    heading_unknown : True if they are too slow for the velocity to give the heading.
+    heading_unknown : True if they are too slow for the velocity to give the heading: then it is `heading`.
     prediction : where they will be; None: they keep their velocity. The problem and the ways use it. What a
         step claims (`Step.safe`, `Step.passively_safe`) is about people who keep their velocity.
     group : with whom they are together: a way between two of a group has a price. None: whoever is near and
@@ -217,8 +214,7 @@ class Person:
 
     Raises
     ------
-    SolverError : a number cannot be used (give measurements to `MPCCBF.step` as an array), or a heading is
-        both given and unknown.
+    SolverError : a number cannot be used: give measurements to `MPCCBF.step` as an array.
     ZoneError : the zone reaches beyond `LARGEST`, or does not contain the person.
 
     Examples
@@ -245,22 +241,16 @@ class Person:
     def __post_init__(self) -> None:
         position = check_point("a person's position", self.position)
         velocity = check_point("a person's velocity", self.velocity)
-        vars(self).update(position=position, velocity=velocity)
-        if self.heading is not None:
-            heading = check_number("a person's heading", self.heading)
-            vars(self).update(heading=heading)
-            if self.heading_unknown:
-                raise SolverError(
-                    f"a heading is given or unknown; got {heading} and heading_unknown for {position}"
-                )
-        elif not (self.stands or self.heading_unknown):
-            vars(self).update(heading=atan2(velocity[1], velocity[0]))
+        heading = self.heading
+        if heading is not None:
+            heading = check_number("a person's heading", heading)
+        elif not (velocity == (0.0, 0.0) or self.heading_unknown):
+            heading = atan2(velocity[1], velocity[0])
+        vars(self).update(position=position, velocity=velocity, heading=heading)
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
-        if not isinstance(self.prediction, Prediction | None):
-            raise SolverError(
-                f"the prediction of a person must be a Prediction; got {self.prediction!r:.200}"
-            )
+        is_one, name = isinstance(self.prediction, Prediction | None), "prediction"
+        require(is_one, name, self.prediction, "a Prediction", SolverError)
 
     @property
     def stands(self) -> bool:
@@ -268,19 +258,19 @@ class Person:
         return self.velocity == (0.0, 0.0)
 
     def after(self, seconds: float) -> Person:
-        """The same person, `seconds` later, as predicted."""
-        if self.stands and self.prediction is None:
+        """The same person, `seconds` later, as predicted, but no farther from the origin than `LARGEST`."""
+        if not seconds or (self.stands and self.prediction is None):
             return self
-        (x, y), (vx, vy) = self.position, self.velocity
+        (x, y), (vx, vy), later = self.position, self.velocity, self.prediction
         x, y = x + vx * seconds, y + vy * seconds
-        if self.prediction is None:
-            return self.at((x, y))
-        (dx, dy, _), *_ = self.prediction.sample(self, np.array([seconds])).tolist()
-        moved = self.at((x + dx, y + dy))
-        vars(moved).update(prediction=self.prediction.later(seconds))
-        return moved
+        if later is not None:
+            dx, dy, _ = later.sample(self, np.array([seconds]))[0].tolist()
+            x, y, later = x + dx, y + dy, later.later(seconds)
+        person = self.at([max(-LARGEST, min(each, LARGEST)) for each in (x, y)])
+        vars(person).update(prediction=later)
+        return person
 
-    def at(self, position: tuple[float, float]) -> Person:
+    def at(self, position: ArrayLike) -> Person:
         """The same person at another `position` [m]; only the position is checked, for speed."""
         moved = copy(self)
         vars(moved).update(position=check_point("a person's position", position))
@@ -292,8 +282,6 @@ SAME_PERSON = 2.0
 SAME_PLACE = 0.5
 """Distance from where a lost person is expected up to which a new id means the same person [m] (assumed)."""
 _LastSeen = tuple[Person, float]  # a person as last seen, and when [s]
-# a measurement: the `Person` if one was given, x, y [m], vx, vy [m/s]
-_Row = tuple[Person | None, float, float, float, float]
 People = Sequence[Person] | ArrayLike
 """People as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
 
@@ -342,10 +330,8 @@ class Tracker:
     """
 
     def __init__(self, *, walking_speed: float = 0.2, memory: float = 1.0) -> None:
-        for name, value in (("walking_speed", walking_speed), ("memory", memory)):
-            is_time = isinstance(value, int | float | np.number) and 0 <= value < inf
-            require(is_time, name, value, "a finite number >= 0", SolverError)
-        self.walking_speed, self.memory = float(walking_speed), float(memory)
+        self.walking_speed = check_finite("walking_speed", walking_speed, 0.0)
+        self.memory = check_finite("memory", memory, 0.0)
         self._last_seen: dict[Hashable, _LastSeen] = {}
         self._now, self._interval = inf, 0.0
 
@@ -375,168 +361,117 @@ class Tracker:
         ------
         SolverError : an argument has the wrong type or shape: an error of the program, not of a sensor.
         """
-        now = check_time(now)
+        now = check_finite("now", now)
         self._set_clock(now)
-        is_plain = ids is None and stamps is None and not self._last_seen
-        if is_plain and isinstance(people, list | tuple):
-            known = tuple(
-                [one for one in people if type(one) is Person and one.id is None]
-            )
-            if len(known) == len(people):
-                return TrackedPeople(known)
-        rows = _split_rows(people)
-        names, given = _check_names(ids, rows)
-        times = _as_floats("stamps", now if stamps is None else stamps)
-        expected = f"one time, or one for each of {len(rows)} people"
-        is_each = times.shape in ((), (len(rows),))
-        require(is_each, "stamps", times.shape, expected, SolverError)
-        self._last_seen = {
-            k: v for k, v in self._last_seen.items() if abs(now - v[1]) <= self.memory
-        }
+        try:
+            if not isinstance(people, list | tuple):
+                people = np.asarray(people, float)
+            names = [getattr(each, "id", None) for each in people]
+            names = names if ids is None else list(ids)
+            given = Counter(names)
+            times = [now] * len(people)
+            if stamps is not None:
+                times = np.full(len(people), stamps, float).tolist()
+            rows = zip(people, names, times, strict=True)
+            measured = [(*self._read(each, name), name, t) for each, name, t in rows]
+        except (TypeError, ValueError, OverflowError) as error:
+            raise SolverError(
+                "people must be Persons, or numbers of shape (n, 4): x, y, vx, vy; ids must be a list of "
+                "hashable values, one for each; stamps must be one time [s], or one for each; got "
+                f"{people!r:.200}, {ids!r:.200}, {stamps!r:.200}: {error}"
+            ) from error
         present, rejected, unknown = list[Person](), 0, 0
-        each_time = np.broadcast_to(times, len(rows)).tolist()
-        for row, name, time in zip(rows, names, each_time, strict=True):
+        for person, is_usable, name, time in measured:
             if given[name] > 1 or name != name:  # NaN
                 name = None
-            last = None if name is None else self._recall(row, name, time, given)
-            seen, is_usable = self._update(row, name, time, last)
-            if seen and name is not None and (is_usable or last):
-                self._last_seen[name] = seen
-            person = _move_forward(*seen, now) if seen else None
-            present += [person] if person else []
-            rejected += not (is_usable and person)
-            unknown += not ((is_usable or last) and person)
-        for name, seen in self._last_seen.items():
-            person = None if name in given else _move_forward(*seen, now)
-            present += [person] if person else []
+            last = self._last_seen.get(name)
+            if is_usable and abs(now - time) <= self.memory:
+                last = self._update(person, name, time, given)
+                if name is not None:
+                    self._last_seen[name] = last
+            else:
+                rejected += 1
+                unknown += last is None
+                if last is None and person:
+                    last = person, now
+            if last:
+                present.append(last[0].after(now - last[1]))
+        for name, (person, time) in self._last_seen.items():
+            if name not in given:
+                present.append(person.after(now - time))
         return TrackedPeople(tuple(present), rejected, unknown)
 
     def _set_clock(self, now: float) -> None:
-        """Begin a step at the time `now`; if the clock went back, so do the times of everybody."""
+        """Begin a step at the time `now`: forget people; if the clock went back, so do their times."""
+        back = 0.0
         if now < self._now:
             back = self._now + self._interval - now
-            self._last_seen = {
-                name: (person, time - back)
-                for name, (person, time) in self._last_seen.items()
-            }
         elif now - self._now <= self.memory:
             self._interval = now - self._now
         self._now = now
+        self._last_seen = {
+            name: (person, time - back)
+            for name, (person, time) in self._last_seen.items()
+            if abs(now - (time - back)) <= self.memory
+        }
 
-    def _recall(
-        self, row: _Row, name: Hashable, time: float, given: Counter[Hashable]
-    ) -> _LastSeen | None:
-        """What is known of the person of a measurement: by their id, or by their place if the id is new."""
-        last = self._last_seen.get(name)
-        if not time <= self._now + self.memory:
-            return last
-        if last is None:
-            lost = {
-                other: _measure_deviation(row, time, *seen)
-                for other, seen in self._last_seen.items()
-                if other not in given and seen[1] <= time
-            }
-            nearest = min(lost, key=lost.__getitem__, default=None)
-            is_same = lost.get(nearest, inf) <= SAME_PLACE
-            return self._last_seen.pop(nearest) if is_same else None
-        if last[1] <= time and SAME_PERSON < _measure_deviation(row, time, *last) < inf:
-            # may be hidden, and has no id any more
-            self._last_seen[Tracker, name] = last
-            return None
-        return last
+    def _read(self, each: Any, name: Hashable) -> tuple[Any, bool]:
+        """The `Person` of a measurement, or None, and True if all of its numbers can be used."""
+        if isinstance(each, Person):
+            return each, True
+        x, y, vx, vy = map(float, each)
+        speed = hypot(vx, vy)
+        if not hypot(x, y) <= LARGEST:
+            return None, False
+        if not speed <= LARGEST:
+            return Person((x, y), id=name), False
+        is_slow = speed < self.walking_speed
+        return Person((x, y), (vx, vy), id=name, heading_unknown=is_slow), True
 
     def _update(
-        self, row: _Row, name: Hashable, time: float, last: _LastSeen | None
-    ) -> tuple[_LastSeen | None, bool]:
-        """The last known state of a person, if any, and True if all numbers of the measurement are usable."""
-        (person, x, y, vx, vy), now = row, self._now
-        if person and name is None and time == now:
-            return (person, now), True
-        if not _are_usable(x, y):
-            return last, False
-        if not (abs(now - time) <= self.memory and (last or _are_usable(vx, vy))):
-            zone = person.zone if person else None
-            return last or (Person((x, y), zone=zone, id=name), now), False
+        self, person: Person, name: Hashable, time: float, given: Counter[Hashable]
+    ) -> _LastSeen:
+        """What is known of a `person` who was measured."""
+        if name is None:
+            return person, time
+        last = self._recall(name, person.position, time, given)
         if last and time < last[1]:
-            return last, True
-        if last and not _are_usable(vx, vy):
-            return (last[0].at((x, y)), time), False
-        seen = person or Person((x, y), (vx, vy), heading_unknown=True)
-        heading, is_moving = seen.heading, (vx, vy) != (0.0, 0.0)
-        if heading is None or (
-            is_moving and name is not None and heading == atan2(vy, vx)
-        ):
+            return last
+        heading, (vx, vy) = person.heading, person.velocity
+        is_slow = hypot(vx, vy) < self.walking_speed and not person.stands
+        if heading is None or (is_slow and heading == atan2(vy, vx)):
             heading = last[0].heading if last else None
-            if hypot(vx, vy) >= self.walking_speed:
-                heading = atan2(vy, vx)
         is_unknown = heading is None
-        seen = replace(seen, id=name, heading=heading, heading_unknown=is_unknown)
-        return (seen, time), True
+        seen = replace(person, id=name, heading=heading, heading_unknown=is_unknown)
+        return seen, time
+
+    def _recall(
+        self,
+        name: Hashable,
+        place: tuple[float, float],
+        time: float,
+        given: Counter[Hashable],
+    ) -> _LastSeen | None:
+        """What is known of a person at a `place`: by their id, or by their place if the id is new."""
+        last, away = self._last_seen.get(name), dict[Hashable, float]()
+        lost = [each for each in self._last_seen if each not in given]
+        for each in [name] if last else lost:
+            person, then = self._last_seen[each]
+            away[each] = dist(place, person.after(time - then).position)
+        nearest = min(away, key=away.__getitem__, default=None)
+        is_same = away.get(nearest, inf) <= (SAME_PERSON if last else SAME_PLACE)
+        if last and not is_same:
+            # somebody else has this id now; the person may be hidden
+            self._last_seen[Tracker, name] = last
+            return None
+        return self._last_seen.pop(nearest) if is_same and not last else last
 
 
-def _move_forward(person: Person, time: float, now: float) -> Person | None:
-    """A person seen at `time`, moved to `now` at constant velocity; None if that is beyond `LARGEST`."""
-    if time == now:
-        return person
-    (x, y), (vx, vy) = person.position, person.velocity
-    if not _are_usable(x + (now - time) * vx, y + (now - time) * vy):
-        return None
-    return person.after(now - time)
-
-
-def _measure_deviation(row: _Row, time: float, person: Person, seen: float) -> float:
-    """Distance from a measurement of this `time` to where a `person`, `seen` before, is expected [m]."""
-    expected, place = _move_forward(person, seen, time), row[1:3]
-    is_known = expected and _are_usable(*place)
-    return dist(place, expected.position) if expected and is_known else inf
-
-
-def _are_usable(x: float, y: float) -> bool:
-    return abs(x) <= LARGEST and abs(y) <= LARGEST
-
-
-def _split_rows(people: Any) -> list[Any]:
-    """People one by one, with their numbers, finite or not."""
-    if isinstance(people, Iterable) and not isinstance(people, np.ndarray):
-        people = list(people)
-        if not [each for each in people if not isinstance(each, Person)]:
-            return [(each, *each.position, *each.velocity) for each in people]
-    expected = "Persons, or numbers of shape (n, 4): x, y, vx, vy"
-    numbers = _as_floats("people", people, expected)
-    is_rows = numbers.shape[1:] == (4,) or not numbers.size
-    require(is_rows, "people", numbers.shape, expected, SolverError)
-    return [(None, *each) for each in numbers.reshape(-1, 4).tolist()]
-
-
-def _check_names(
-    ids: Iterable[Hashable] | None, rows: Sequence[_Row]
-) -> tuple[list[Hashable], Counter[Hashable]]:
-    """The id of each person, or None, and how often each id was given."""
-    try:
-        names = [row[0] and row[0].id for row in rows] if ids is None else list(ids)
-        given = Counter(name for name in names if name is not None)
-    except TypeError as error:
-        raise SolverError(
-            f"ids must be a list of hashable values; got {ids!r:.200}"
-        ) from error
-    expected = f"one for each of {len(rows)} people"
-    require(len(names) == len(rows), "ids", len(names), expected, SolverError)
-    return names, given
-
-
-def check_time(now: float) -> float:
-    """The time `now` [s] as a Python float; SolverError if it is not a finite number."""
-    if type(now) is float and isfinite(now):
-        return now
-    time = _as_floats("now", now)
-    is_time = not time.shape and np.isfinite(time)
-    require(is_time, "now", now, "a finite time [s]", SolverError)
-    return float(time)
-
-
-def _as_floats(name: str, value: Any, expected: str = "numbers [s]") -> Array:
-    """The numbers of an argument, finite or not."""
-    try:
-        return np.asarray(value, float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise SolverError(f"{name} must be {expected}; got {value!r:.200}") from error
+def check_finite(name: str, value: Any, least: float = -1e300) -> float:
+    """A `value` as a Python float; SolverError if it is no finite number, or below the `least`."""
+    number = inf
+    with suppress(TypeError, ValueError, OverflowError):
+        number = float(value)
+    is_finite, expected = abs(number) < inf, f"a finite number, at least {least:g}"
+    require(is_finite and number >= least, name, value, expected, SolverError)
+    return number

@@ -290,13 +290,12 @@ def test_known_people_with_bad_numbers_are_moved_forward_and_counted(bad):
         assert seen.people[0].position == pytest.approx((0.2, 0))
     seen = tracker.see([[0.3, 0.1, bad, 0]], ids=["a"], now=0.3)
     assert (seen.rejected, seen.unknown) == (1, 0)
-    assert seen.people[0].position == (0.3, 0.1) and seen.people[0].velocity == (
-        1.0,
-        0.0,
-    )
+    (person,) = seen.people
+    assert person.position == pytest.approx((0.3, 0.0)), "rejected as a whole"
+    assert person.velocity == (1.0, 0.0)
     seen = tracker.see([[0.3, 0.1, 1, 0]], ids=["a"], stamps=bad, now=0.4)
     assert (seen.rejected, seen.unknown) == (1, 0)
-    assert seen.people[0].position == pytest.approx((0.4, 0.1))
+    assert seen.people[0].position == pytest.approx((0.4, 0.0))
     assert tracker.see([[bad] * 4], ids=["a"], now=2.0)[1:] == (1, 1), "too long ago"
 
 
@@ -337,18 +336,17 @@ def test_with_unknown_people_the_target_is_where_full_braking_ends():
 @pytest.mark.parametrize(
     ("people", "more", "message"),
     [
-        ([[0, 0, 0]], {}, r"shape \(n, 4\): x, y, vx, vy; got \(1, 3\)"),
-        ([0, 0, 0, 0], {}, r"got \(4,\)"),
+        ([[0, 0, 0]], {}, r"shape \(n, 4\): x, y, vx, vy.*\[\[0, 0, 0\]\]"),
+        ([0, 0, 0, 0], {}, r"got \[0, 0, 0, 0\]"),
         ([["a", 0, 0, 0]], {}, "Persons, or numbers"),
-        ([szlib.Person((0, 0)), (0, 0, 0, 0)], {}, "Persons, or numbers"),
-        ([[0, 0, 0, 0]], {"ids": [1, 2]}, "one for each of 1 people; got 2"),
+        ([[0, 0, 0, 0]], {"ids": [1, 2]}, r"ids .*, one for each; .*\[1, 2\]"),
         (
             [[0, 0, 0, 0]],
             {"stamps": [1, 2], "now": 3},
-            r"stamps must be one time, .* \(2,\)",
+            r"stamps must be one time .* \[1, 2\]",
         ),
         ([[0, 0, 0, 0]], {"stamps": 1.0}, "stamps need `now`"),
-        ([[0, 0, 0, 0]], {"now": np.nan}, "now must be a finite time"),
+        ([[0, 0, 0, 0]], {"now": np.nan}, "now must be a finite number"),
     ],
 )
 def test_arguments_of_the_wrong_shape_raise_an_error(people, more, message):
@@ -357,7 +355,7 @@ def test_arguments_of_the_wrong_shape_raise_an_error(people, more, message):
 
 
 @pytest.mark.parametrize("name", ["memory", "walking_speed"])
-@pytest.mark.parametrize("value", [-1, np.inf, np.nan, "1"])
+@pytest.mark.parametrize("value", [-1, np.inf, np.nan, "one"])
 def test_tracker_parameters_must_be_finite_and_not_negative(name, value):
     with pytest.raises(szlib.SolverError, match=f"{name} must be"):
         szlib.Tracker(**{name: value})
@@ -488,10 +486,6 @@ def test_people_that_are_no_rows_are_refused(people):
         ({"position": (0, np.nan), "heading": 0.0}, "position must be finite"),
         ({"position": (0, 0), "velocity": (np.inf, 0)}, "velocity must be finite"),
         ({"position": (0, 0, 0), "heading": 0.0}, "position must have shape"),
-        (
-            {"position": (0, 0), "heading": 0.1, "heading_unknown": True},
-            "given or unknown",
-        ),
         ({"position": (0, 0), "heading": np.nan}, "heading must be finite"),
         ({"position": (1e155, 0), "heading": 0.0}, "position must lie within"),
         ({"position": (0, 0), "velocity": (0, -1e155)}, "velocity must lie within"),

@@ -125,7 +125,7 @@ def test_covariances_count_by_their_largest_deviation() -> None:
         ({"times": [0.0, 1.0]}, "positive and increasing"),
         ({"times": [1.0, 1.0]}, "positive and increasing"),
         ({"times": [1.0, np.nan]}, "finite"),
-        ({"times": 1.0}, "positive and increasing"),
+        ({"times": 1.0}, r"shape \(1, 2\)"),
         ({"positions": [(0.0, 0.0)]}, r"shape \(2, 2\)"),
         ({"positions": [(0.0, 0.0), (np.nan, 0.0)]}, "finite"),
         ({"spread": [0.1]}, "at least 0"),
@@ -141,8 +141,13 @@ def test_what_cannot_be_used_is_named(changes: dict, message: str) -> None:
 
 def test_arrays_of_another_number_of_people_are_refused() -> None:
     people = [[0.0, 0.0, 1.0, 0.0], [3.0, 0.0, 1.0, 0.0]]
-    with pytest.raises(szlib.SolverError, match="one for each of 2 people"):
+    with pytest.raises(
+        szlib.SolverError, match=r"positions must have shape \(2, 1, 2\)"
+    ):
         predict(people, [1.0], [[(1.0, 0.0)]])
+    places = [[(1.0, 0.0)], [(4.0, 0.0)]]
+    with pytest.raises(szlib.SolverError, match="one for each of 2 people"):
+        predict(people, [1.0], places, [0.1, 0.1, 0.1])
     with pytest.raises(szlib.SolverError, match="must be a Prediction"):
         szlib.Person((0.0, 0.0), prediction=[(1.0, 0.0)])
 

@@ -190,7 +190,7 @@ def test_a_number_of_worlds_below_one_is_rejected():
 def test_a_failing_world_is_named_by_its_seed():
     with pytest.raises(
         szlib.SolverError,
-        match="the controller failed in world 5: a zone must be within",
+        match="the controller failed in world 5: a zone must contain its person",
     ):
         RolloutSetup(worlds=Worlds(standing=1.0), zone_transform=huge).run(5)
 
