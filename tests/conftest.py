@@ -1,13 +1,9 @@
 """Settings of all tests, the real data, and notebooks to run."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -15,7 +11,6 @@ from unittest import mock
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import hypothesis
-import pandas as pd
 import pytest
 from helpers.track_tables import real_data
 
@@ -26,7 +21,7 @@ hypothesis.settings.load_profile("szlib")
 
 
 @pytest.fixture(autouse=True)
-def closed_figures() -> Iterator[None]:
+def closed_figures():
     """Close every figure of a test: Matplotlib warns of the 21st open one."""
     yield
     if plt := sys.modules.get("matplotlib.pyplot"):
@@ -34,7 +29,7 @@ def closed_figures() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def sentences_held_by_notebook_10() -> Iterator[None]:
+def sentences_held_by_notebook_10():
     """The claims that notebook 28 judges are here those of notebook 10."""
     from szlib.workbook import claims
 
@@ -48,13 +43,13 @@ def sentences_held_by_notebook_10() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def real_tracks() -> pd.DataFrame:
+def real_tracks():
     """The real day, 2012-10-24, on the common clock."""
     return szlib.read_tracks(sorted(real_data("atc-1hz").glob("*.csv")))
 
 
 @pytest.fixture(scope="session")
-def real_samples(real_tracks: pd.DataFrame) -> pd.DataFrame:
+def real_samples(real_tracks):
     """The encounters of the real day."""
     return szlib.find_encounters(real_tracks)
 
@@ -77,7 +72,7 @@ record.key["seed"] = seed
 
 
 @pytest.fixture
-def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+def notebooks(tmp_path, monkeypatch):
     """A workbook of its own: `notebooks(_01_name=code)` writes notebooks and returns their folder."""
     from szlib.workbook import folders
 
@@ -87,7 +82,7 @@ def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.csv").write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
 
-    def write(**codes: str) -> Path:
+    def write(**codes):
         for name, code in codes.items():
             text = (
                 NOTEBOOK.format(name=f"{name[1:]}")
@@ -101,15 +96,13 @@ def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
 
 
 @pytest.fixture
-def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_kernels(monkeypatch):
     """Run the cells of notebooks in this process, to test what a run does around them."""
     import jupytext
 
     from szlib.workbook import execution
 
-    def run_cells(
-        script: Path, given: dict[str, Any], folder: Path, environment: dict[str, str]
-    ) -> None:
+    def run_cells(script, given, folder, environment):
         notebook, variables = jupytext.read(script), dict[str, Any]()
         try:
             with (

@@ -60,7 +60,7 @@ def test_the_commands_and_programs_of_the_page_of_decisions_run(
     assert "respect" in capsys.readouterr().out
 
 
-def table(name: str) -> pd.DataFrame:
+def table(name):
     return pd.read_csv(ROOT / "notebooks" / "tables" / f"{name}.csv", comment="#")
 
 

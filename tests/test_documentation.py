@@ -1,14 +1,11 @@
 """Documentation: every parameter is described, every example runs, every exported name has an example."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import doctest
 import importlib
 import inspect
 import re
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import matplotlib
@@ -24,7 +21,7 @@ ENTRY = re.compile(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) :(?: |$)", re.MULTILINE)
 QUOTED = re.compile(r"(`+)(.+?)\1", re.DOTALL)
 
 
-def module_names() -> Iterator[str]:
+def module_names():
     for path in sorted(PACKAGE.rglob("*.py")):
         if path.name != "__main__.py":
             parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
@@ -37,7 +34,7 @@ def module_names() -> Iterator[str]:
 MODULES = list(module_names())
 
 
-def fail_with(problems: list[str]) -> None:
+def fail_with(problems):
     if problems:
         pytest.fail("\n".join(problems), pytrace=False)
 
@@ -45,13 +42,13 @@ def fail_with(problems: list[str]) -> None:
 # --- parameters --------------------------------------------------------------------------------------
 
 
-def sections(docstring: str) -> dict[str, str]:
+def sections(docstring):
     """The text of each underlined section."""
     parts = SECTION.split(docstring)
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
-def entries(docstring: str, *names: str) -> set[str]:
+def entries(docstring, *names):
     """The names that have an entry in one of these sections."""
     text = "\n".join(sections(docstring).get(name, "") for name in names)
     return {
@@ -61,7 +58,7 @@ def entries(docstring: str, *names: str) -> set[str]:
     }
 
 
-def quoted(docstring: str) -> set[str]:
+def quoted(docstring):
     """Every word in backticks."""
     return {
         word
@@ -70,7 +67,7 @@ def quoted(docstring: str) -> set[str]:
     }
 
 
-def parameters(function: Callable[..., object]) -> set[str]:
+def parameters(function):
     names = inspect.signature(function).parameters
     return {
         name
@@ -79,7 +76,7 @@ def parameters(function: Callable[..., object]) -> set[str]:
     }
 
 
-def constructor_parameters(kind: type) -> set[str]:
+def constructor_parameters(kind):
     """Parameters of a class; none where the constructor is not written in szlib."""
     if dataclasses.is_dataclass(kind) or hasattr(kind, "_fields"):
         return parameters(kind)
@@ -90,7 +87,7 @@ def constructor_parameters(kind: type) -> set[str]:
     return parameters(kind) if is_ours else set()
 
 
-def attributes(kind: type) -> set[str]:
+def attributes(kind):
     """Names of a class's attributes, also of those that its methods set."""
     names = set(dir(kind))
     for base in kind.__mro__:
@@ -100,7 +97,7 @@ def attributes(kind: type) -> set[str]:
     return names
 
 
-def described(module: str) -> Iterator[tuple[str, str, set[str], set[str]]]:
+def described(module):
     """Name, docstring, parameters and attributes of each public function, class and method of a module."""
     members = vars(importlib.import_module(module))
     for name, found in members.items():
@@ -126,7 +123,7 @@ def described(module: str) -> Iterator[tuple[str, str, set[str], set[str]]]:
             yield name, inspect.getdoc(found) or "", parameters(found), set()
 
 
-def test_every_parameter_is_described() -> None:
+def test_every_parameter_is_described():
     """An entry under Parameters (or Attributes), or its name in backticks; no entry for what is not there."""
     problems = []
     for module in MODULES:
@@ -148,7 +145,7 @@ def test_every_parameter_is_described() -> None:
     fail_with(problems)
 
 
-def test_everything_public_has_a_docstring() -> None:
+def test_everything_public_has_a_docstring():
     """Functions within functions as well."""
     silent = []
     for module in MODULES:
@@ -173,7 +170,7 @@ def test_everything_public_has_a_docstring() -> None:
 # --- examples ----------------------------------------------------------------------------------------
 
 
-def examples(module: str) -> list[doctest.DocTest]:
+def examples(module):
     """The examples of a module's docstrings; `szlib` and `np` are there without an import."""
     finder = doctest.DocTestFinder(exclude_empty=True)
     names = {"szlib": szlib, "np": np}
@@ -185,22 +182,20 @@ def examples(module: str) -> list[doctest.DocTest]:
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_every_example_runs(
-    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_example_runs(module, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     matplotlib.use("Agg")
     runner = doctest.DocTestRunner(
         optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS, verbose=False
     )
-    report: list[str] = []
+    report = []
     for example in examples(module):
         runner.run(example, out=report.append)
         plt.close("all")
     assert not report, "".join(report)
 
 
-def test_every_exported_name_has_an_example() -> None:
+def test_every_exported_name_has_an_example():
     """A section in its docstring; a constant is used in an example of its module or another one."""
     text, problems = (
         "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")),

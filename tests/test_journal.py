@@ -4,10 +4,8 @@ import re
 import shutil
 import subprocess
 import tomllib
-from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -43,7 +41,7 @@ MISSING = {
 """Fields that only the owner can add, and their place below [project]."""
 
 
-def find_owner(value: Any, path: str = "") -> Iterator[str]:
+def find_owner(value, path=""):
     """The places of the word "owner" in nested lists and mappings."""
     if isinstance(value, dict):
         for key, part in value.items():
@@ -55,7 +53,7 @@ def find_owner(value: Any, path: str = "") -> Iterator[str]:
         yield path
 
 
-def find_placeholders() -> set[str]:
+def find_placeholders():
     """Every place that waits for the owner, as CONTRIBUTING names it."""
     found = {f".paper/paper.md: {each}" for each in find_owner(FRONT)}
     found |= {f"CITATION.cff: {each}" for each in find_owner(CITATION)}

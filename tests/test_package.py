@@ -1,7 +1,5 @@
 """The package as a whole: its rooms and their order, cheap to import, with the promised names."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import inspect
@@ -61,13 +59,13 @@ MODULES = sorted(
 
 
 @cache
-def source(module: str) -> ast.Module:
+def source(module):
     return ast.parse(
         (PACKAGE / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
     )
 
 
-def nodes(tree: ast.Module, *, lazy: bool = True, types: bool = False) -> list[ast.AST]:
+def nodes(tree, *, lazy=True, types=False):
     """Every node that runs, at import only if not lazy; those under TYPE_CHECKING if types."""
     for_types = (
         set()
@@ -87,9 +85,7 @@ def nodes(tree: ast.Module, *, lazy: bool = True, types: bool = False) -> list[a
 
 
 @cache
-def imports(
-    module: str, *, lazy: bool = True, types: bool = False
-) -> tuple[set[str], set[str]]:
+def imports(module, *, lazy=True, types=False):
     """What a module imports: modules (or rooms) of szlib, and other packages."""
     own, foreign = set(), set()
     for node in nodes(source(module), lazy=lazy, types=types):
@@ -106,7 +102,7 @@ def imports(
     return own - {""}, foreign
 
 
-def test_the_top_level_is_fixed() -> None:
+def test_the_top_level_is_fixed():
     done = subprocess.run(
         ["git", "ls-files"], cwd=PACKAGE.parent, capture_output=True, text=True
     )
@@ -119,7 +115,7 @@ def test_the_top_level_is_fixed() -> None:
     }  # fmt: skip
 
 
-def test_the_version_is_the_same_everywhere() -> None:
+def test_the_version_is_the_same_everywhere():
     root = PACKAGE.parent
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))[
         "project"
@@ -134,13 +130,13 @@ def test_the_version_is_the_same_everywhere() -> None:
     assert f"\ndate-released: {released.group(2)}\n" in citation
 
 
-def test_names_of_test_modules_are_unique() -> None:
+def test_names_of_test_modules_are_unique():
     """pytest imports test modules by their file name alone."""
     names = Counter(path.name for path in TESTS.rglob("test_*.py"))
     assert [name for name, count in names.items() if count > 1] == []
 
 
-def test_no_test_module_imports_another() -> None:
+def test_no_test_module_imports_another():
     names = "|".join(["conftest", *(path.stem for path in TESTS.rglob("test_*.py"))])
     imported = re.compile(
         rf"^\s*(?:from|import) (?:[\w.]+\.)?(?:{names})\b", re.MULTILINE
@@ -156,15 +152,15 @@ def test_no_test_module_imports_another() -> None:
 # --- rooms -------------------------------------------------------------------------------------------
 
 
-def room(module: str) -> str:
+def room(module):
     return module.split(".")[0]
 
 
-def test_every_module_is_in_a_room() -> None:
+def test_every_module_is_in_a_room():
     assert {room(module) for module in MODULES} == set(ROOMS)
 
 
-def test_a_room_imports_only_from_rooms_above_it() -> None:
+def test_a_room_imports_only_from_rooms_above_it():
     place = {name: number for number, name in enumerate(ROOMS)}
     imported = {(module, name) for module in MODULES for name in imports(module)[0]}
     assert {
@@ -172,7 +168,7 @@ def test_a_room_imports_only_from_rooms_above_it() -> None:
     } - DRAWN == set()
 
 
-def test_no_modules_import_each_other_in_a_circle() -> None:
+def test_no_modules_import_each_other_in_a_circle():
     graph = {
         module: imports(module, types=True)[0] & set(MODULES) for module in MODULES
     }
@@ -188,7 +184,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     assert {module: names & set(graph) for module, names in graph.items()} == {}
 
 
-def test_each_library_has_its_room() -> None:
+def test_each_library_has_its_room():
     for module in MODULES:
         foreign, at_import = imports(module)[1], imports(module, lazy=False)[1]
         assert "casadi" not in foreign or room(module) == CASADI, module
@@ -202,7 +198,7 @@ def test_each_library_has_its_room() -> None:
         )
 
 
-def test_a_module_does_nothing_when_imported() -> None:
+def test_a_module_does_nothing_when_imported():
     for module in MODULES:
         tree = source(module)
         calls = [
@@ -217,7 +213,7 @@ def test_a_module_does_nothing_when_imported() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
-def test_imports_start_no_threads() -> None:
+def test_imports_start_no_threads():
     """Kernels are forked from a process with all imports; a pool of threads of Polars would stop there."""
     code = """if True:
         import os
@@ -229,7 +225,7 @@ def test_imports_start_no_threads() -> None:
     assert done.stdout == "0\n", done.stderr
 
 
-def test_the_tests_have_the_same_rooms() -> None:
+def test_the_tests_have_the_same_rooms():
     tests = Path(__file__).parent
     assert set(ROOMS) <= {path.name for path in tests.iterdir()}
 
@@ -237,7 +233,7 @@ def test_the_tests_have_the_same_rooms() -> None:
 # --- cheap to import ---------------------------------------------------------------------------------
 
 
-def loaded_after(*codes: str) -> list[set[str]]:
+def loaded_after(*codes):
     """Modules in memory after each of these codes, which run one after another in one new interpreter."""
     program = "".join(
         ["import sys\n", *(f"{code}\nprint(*sys.modules)\n" for code in codes)]
@@ -249,7 +245,7 @@ def loaded_after(*codes: str) -> list[set[str]]:
     return [set(line.split()) for line in lines]
 
 
-def test_each_way_into_the_package_loads_only_what_it_needs() -> None:
+def test_each_way_into_the_package_loads_only_what_it_needs():
     """Neither CasADi nor figures from tracks to zones, no figures for a robot, nothing heavy for the name."""
     szlib_alone, zones, robot = loaded_after(
         "import szlib",
@@ -273,7 +269,7 @@ def test_each_way_into_the_package_loads_only_what_it_needs() -> None:
     assert "szlib.control.controller" in robot
 
 
-def test_a_robots_process_loads_no_tables_and_no_figures() -> None:
+def test_a_robots_process_loads_no_tables_and_no_figures():
     """One step of each controller, in a fresh process."""
     (robot,) = loaded_after(
         "import szlib\n"
@@ -292,7 +288,7 @@ def test_a_robots_process_loads_no_tables_and_no_figures() -> None:
     assert heavy & robot == set()
 
 
-def test_a_robot_needs_only_the_packages_of_a_plain_install() -> None:
+def test_a_robot_needs_only_the_packages_of_a_plain_install():
     """Its controller, a zone that ships, and a map: nothing of the extra `data`."""
     (robot,) = loaded_after(
         "import szlib\n"
@@ -304,7 +300,7 @@ def test_a_robot_needs_only_the_packages_of_a_plain_install() -> None:
     assert "casadi" in robot and data & robot == set()
 
 
-def test_what_kernels_are_forked_with_has_no_threads_of_polars() -> None:
+def test_what_kernels_are_forked_with_has_no_threads_of_polars():
     """A fork does not survive them: a notebook would wait for ever when it reads tracks."""
     from szlib.workbook.execution import PRELOADED
 
@@ -312,7 +308,7 @@ def test_what_kernels_are_forked_with_has_no_threads_of_polars() -> None:
     assert "matplotlib" in loaded and "polars" not in loaded
 
 
-def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
+def test_the_command_line_loads_neither_numbers_nor_notebooks():
     (loaded,) = loaded_after(
         "from szlib.workbook.cli import build_parser; build_parser()"
     )
@@ -329,7 +325,7 @@ def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
 # --- names -------------------------------------------------------------------------------------------
 
 
-def test_every_promised_name_is_there() -> None:
+def test_every_promised_name_is_there():
     for name in PUBLIC:
         assert name in dir(szlib)
         assert getattr(szlib, name) is not None
@@ -338,16 +334,16 @@ def test_every_promised_name_is_there() -> None:
 
 
 @pytest.mark.parametrize("name", PROMISED)
-def test_every_promised_method_is_there(name: str) -> None:
+def test_every_promised_method_is_there(name):
     owner, method = name.split(".")
     assert callable(getattr(getattr(szlib, owner), method))
 
 
-def test_every_scenario_is_there() -> None:
+def test_every_scenario_is_there():
     assert set(szlib.SCENARIOS) >= {"passing", "corridor", "waiting", "making_room"}
 
 
-def test_an_object_that_users_hold_cannot_be_changed() -> None:
+def test_an_object_that_users_hold_cannot_be_changed():
     held = [
         value
         for name in szlib.__all__
@@ -359,7 +355,7 @@ def test_an_object_that_users_hold_cannot_be_changed() -> None:
     assert len(held) > 20 and not changeable
 
 
-def test_the_errors_are_one_family() -> None:
+def test_the_errors_are_one_family():
     assert issubclass(szlib.DataError, szlib.SzlibError)
     assert issubclass(szlib.DataError, ValueError)
     assert issubclass(szlib.ZoneError, szlib.SzlibError)
@@ -369,8 +365,8 @@ def test_the_errors_are_one_family() -> None:
     assert issubclass(szlib.DataWarning, UserWarning)
 
 
-def test_the_keywords_of_the_paper_are_there() -> None:
-    def parameters(function: object) -> set[str]:
+def test_the_keywords_of_the_paper_are_there():
+    def parameters(function):
         return set(inspect.signature(function).parameters)
 
     assert {"area", "space", "min_speed"} <= parameters(szlib.EncounterSettings)
@@ -379,7 +375,7 @@ def test_the_keywords_of_the_paper_are_there() -> None:
     assert {"gamma", "N", "N_h", "dt", "pass_side"} <= parameters(szlib.MPCSettings)
 
 
-def test_ready_made_environments_name_what_exists() -> None:
+def test_ready_made_environments_name_what_exists():
     """A container and Binder install versions of the lock, and a workflow calls commands that exist."""
     root = PACKAGE.parent
     container = json.loads((root / ".devcontainer" / "devcontainer.json").read_text())

@@ -23,7 +23,7 @@ def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(
     tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    found: dict[str, object] = {}
+    found = {}
     exec(WHOLE, found)
     assert found["log"].metrics()["success"]
     assert float(capsys.readouterr().out.splitlines()[-1]) >= 0

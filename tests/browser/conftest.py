@@ -1,7 +1,5 @@
 """JupyterLab on a copy of the repository, and a Chromium of this machine to open it in."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -11,7 +9,6 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 
 import jupytext
@@ -56,7 +53,7 @@ OPERATED = {
 """Cells that are operated in the browser, and what they need; `make run` executes the whole notebooks."""
 
 
-def chromium() -> str:
+def chromium():
     found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if found is None:
         reason = f"no browser on this machine: looked for {', '.join(BROWSERS)}"
@@ -67,7 +64,7 @@ def chromium() -> str:
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[object]:
+def browser():
     """A context of Chromium, whose pages share what they have loaded."""
     executable = chromium()
     playwright = pytest.importorskip("playwright.sync_api")
@@ -80,7 +77,7 @@ def browser() -> Iterator[object]:
 
 
 @pytest.fixture(scope="session")
-def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def copy(browser, tmp_path_factory):
     """The package, the notebooks and their settings, as a git repository of their own."""
     folder = tmp_path_factory.mktemp("copy") / "szlib"
     for name in ("szlib", "notebooks"):
@@ -104,7 +101,7 @@ def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def shorten(script: Path) -> None:
+def shorten(script):
     """Leave in a pair its set-up, a given zone, and the cells that are operated."""
     notebook, kept = jupytext.read(script), []
     for cell in notebook.cells:
@@ -128,7 +125,7 @@ def shorten(script: Path) -> None:
 
 
 @pytest.fixture(scope="session")
-def lab(copy: Path) -> Iterator[str]:
+def lab(copy):
     """The address of a JupyterLab whose files are those of the copy."""
     home = copy.parent / "jupyter"
     for name, content in SETTINGS.items():
@@ -169,7 +166,7 @@ def lab(copy: Path) -> Iterator[str]:
         log.close()
 
 
-def _wait(server: subprocess.Popen[bytes], address: str, log: Path) -> None:
+def _wait(server, address, log):
     for _ in range(600):
         if server.poll() is not None:
             break

@@ -1,12 +1,9 @@
 """Areas: all forms mean the same, the direction of the axes does not matter; the area where people walk."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -39,18 +36,14 @@ SHAPES = {
 }
 
 
-def turned(
-    shape: object, angle: float, by: tuple[float, float] = (3.0, -7.0)
-) -> object:
+def turned(shape, angle, by=(3.0, -7.0)):
     matrix = np.array(
         [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
     )
     return shapely.transform(shape, lambda points: points @ matrix.T + by)
 
 
-def turned_tracks(
-    tracks: pd.DataFrame, angle: float, by: tuple[float, float] = (3.0, -7.0)
-) -> pd.DataFrame:
+def turned_tracks(tracks, angle, by=(3.0, -7.0)):
     matrix = np.array(
         [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
     )
@@ -63,7 +56,7 @@ def turned_tracks(
 # --- one area, many forms ----------------------------------------------------------------------------
 
 
-def geojson(shape: object, kind: str) -> str:
+def geojson(shape, kind):
     geometry = json.loads(shapely.to_geojson(shape))
     feature = {"type": "Feature", "properties": {"name": "hall"}, "geometry": geometry}
     whole = {"type": "FeatureCollection", "features": [feature]}
@@ -76,7 +69,7 @@ def geojson(shape: object, kind: str) -> str:
 @pytest.mark.parametrize(
     "form", ["shapely", "wkt", "geometry", "feature", "collection", "text", "with z"]
 )
-def test_all_forms_give_the_same_area(tmp_path: Path, name: str, form: str) -> None:
+def test_all_forms_give_the_same_area(tmp_path, name, form):
     shape = SHAPES[name]
     given = {
         "shapely": shape,
@@ -99,11 +92,11 @@ def test_all_forms_give_the_same_area(tmp_path: Path, name: str, form: str) -> N
     "given",
     ["0 12 0 8", "0,12, 0,8", [0, 12, 0, 8], "POLYGON ((0 0, 0 8, 12 8, 12 0, 0 0))"],
 )
-def test_four_numbers_are_a_square(given: object) -> None:
+def test_four_numbers_are_a_square(given):
     assert szlib.as_area(given) == Square(x=(0, 12), y=(0, 8))
 
 
-def test_areas_of_pedpy_are_accepted() -> None:
+def test_areas_of_pedpy_are_accepted():
     pedpy = pytest.importorskip("pedpy")
     assert szlib.as_area(pedpy.WalkableArea(HALL)) == Square(x=(0, 12), y=(0, 8))
     with_pillar = pedpy.WalkableArea(
@@ -119,14 +112,12 @@ numbers = strategies.floats(-1e6, 1e6, allow_nan=False)
 
 
 @given(numbers, strategies.floats(1e-3, 1e6), numbers, strategies.floats(1e-3, 1e6))
-def test_text_of_a_square_round_trips(
-    x: float, width: float, y: float, height: float
-) -> None:
+def test_text_of_a_square_round_trips(x, width, y, height):
     square = Square(x=(x, x + width), y=(y, y + height))
     assert szlib.as_area(str(square)) == square
 
 
-def test_numbers_of_a_square_come_back() -> None:
+def test_numbers_of_a_square_come_back():
     square = Square(x=(-1.5, 3.25), y=(0.1, 7))
     assert str(square) == "-1.5 3.25 0.1 7.0"
     assert repr(square) == "Area(x=(-1.5, 3.25), y=(0.1, 7.0), area=32.775)"
@@ -135,9 +126,7 @@ def test_numbers_of_a_square_come_back() -> None:
 
 
 @given(numbers, numbers, strategies.floats(1e-3, 100))
-def test_grown_square_has_the_margin_on_each_side(
-    x: float, y: float, margin: float
-) -> None:
+def test_grown_square_has_the_margin_on_each_side(x, y, margin):
     grown = Square(x=(x, x + 11), y=(y, y + 18)).grown(margin)
     expected = (x - margin, x + 11 + margin, y - margin, y + 18 + margin)
     assert (*grown.x, *grown.y) == pytest.approx(expected, rel=0, abs=1e-9)
@@ -147,14 +136,14 @@ def test_grown_square_has_the_margin_on_each_side(
     )
 
 
-def test_reason_is_neither_compared_nor_shown() -> None:
+def test_reason_is_neither_compared_nor_shown():
     assert Area(HALL, "a reason") == Area(HALL)
     assert repr(Area(HALL, "a reason")) == repr(Area(HALL))
     assert szlib.as_area(Area(HALL, "a reason")).reason == "a reason"
 
 
 @given(strategies.floats(0, 7), numbers, numbers)
-def test_text_of_a_polygon_round_trips(angle: float, x: float, y: float) -> None:
+def test_text_of_a_polygon_round_trips(angle, x, y):
     area = szlib.as_area(turned(ELL, angle, (x, y)))
     assert szlib.as_area(str(area)) == area
 
@@ -177,7 +166,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG.items())
-def test_invalid_text_raises(text: str, message: str) -> None:
+def test_invalid_text_raises(text, message):
     with pytest.raises(szlib.DataError, match=message):
         szlib.as_area(text)
 
@@ -186,12 +175,12 @@ def test_invalid_text_raises(text: str, message: str) -> None:
     "given",
     [None, 3, [1, 2, 3], shapely.Point(1, 2), shapely.LineString([(0, 0), (1, 1)])],
 )
-def test_objects_that_are_no_area_raise(given: object) -> None:
+def test_objects_that_are_no_area_raise(given):
     with pytest.raises(szlib.DataError, match="area"):
         szlib.as_area(given)
 
 
-def test_error_names_a_file_that_is_no_area(tmp_path: Path) -> None:
+def test_error_names_a_file_that_is_no_area(tmp_path):
     for content in (
         b"t,id,x,y\n1,2,3,4\n",
         b"",
@@ -210,7 +199,7 @@ def test_error_names_a_file_that_is_no_area(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_contains_agrees_with_matplotlib(name: str, angle: float) -> None:
+def test_contains_agrees_with_matplotlib(name, angle):
     shape = turned(SHAPES[name], angle)
     area = szlib.as_area(shape)
     x0, x1, y0, y1 = *area.x, *area.y
@@ -224,7 +213,7 @@ def test_contains_agrees_with_matplotlib(name: str, angle: float) -> None:
     np.testing.assert_array_equal(area.contains(x, y), crossings % 2 == 1)
 
 
-def test_border_is_inside() -> None:
+def test_border_is_inside():
     polygon = szlib.ATC_SQUARE
     ticks = np.r_[
         -18.5,
@@ -241,7 +230,7 @@ def test_border_is_inside() -> None:
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_covers_requires_every_point_inside(name: str) -> None:
+def test_covers_requires_every_point_inside(name):
     area = Area(SHAPES[name])
     rng = np.random.default_rng(1)
     n, unit = 400, np.linspace(0, 1, 41)
@@ -267,7 +256,7 @@ def test_covers_requires_every_point_inside(name: str) -> None:
 # --- encounters --------------------------------------------------------------------------------------
 
 
-def test_square_given_as_polygon_gives_identical_encounters() -> None:
+def test_square_given_as_polygon_gives_identical_encounters():
     pedpy = pytest.importorskip("pedpy")
     found = 0
     for seed in range(6):
@@ -289,7 +278,7 @@ def test_square_given_as_polygon_gives_identical_encounters() -> None:
 
 
 @pytest.mark.parametrize("angle", [0.3, -2.0])
-def test_encounters_do_not_depend_on_the_direction_of_the_axes(angle: float) -> None:
+def test_encounters_do_not_depend_on_the_direction_of_the_axes(angle):
     crowd = make_crowd(77, people=160, seconds=200, square=ROOM)
     for shape in (
         shapely.box(-20, -20, 20, 20),
@@ -304,7 +293,7 @@ def test_encounters_do_not_depend_on_the_direction_of_the_axes(angle: float) -> 
         assert samples["kind"].tolist() == known["kind"].tolist()
 
 
-def test_no_encounter_where_the_space_holds_a_pillar() -> None:
+def test_no_encounter_where_the_space_holds_a_pillar():
     walks = (
         make_walk((1, 5), (1.0, 0), duration=6),
         make_walk((9, 5), (-1.0, 0), person=2, duration=6),
@@ -322,9 +311,7 @@ def test_no_encounter_where_the_space_holds_a_pillar() -> None:
         ATC_POLYGON - shapely.box(-13, -1, -12, 0),
     ],
 )
-def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(
-    tmp_path: Path, shape: object
-) -> None:
+def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(tmp_path, shape):
     found = 0
     for seed in range(2):
         path = write_raw_day(
@@ -336,7 +323,7 @@ def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(
     assert found > 0
 
 
-def test_null_model_accepts_any_area() -> None:
+def test_null_model_accepts_any_area():
     crowd = make_crowd(7, people=60, seconds=600)
     options = {"shifts": 2, "minutes": (0.2, 2.0), "progress": False}
     expected = null_encounters(crowd, square=szlib.ATC_SQUARE, **options)
@@ -347,7 +334,7 @@ def test_null_model_accepts_any_area() -> None:
 # --- where people walked -----------------------------------------------------------------------------
 
 
-def test_walked_area_reaches_the_walls_of_a_hall() -> None:
+def test_walked_area_reaches_the_walls_of_a_hall():
     found = szlib.walked_area(make_hall())
     assert found.polygon.symmetric_difference(HALL).area < 4
     assert found == area_for(make_hall(), "auto")
@@ -356,9 +343,7 @@ def test_walked_area_reaches_the_walls_of_a_hall() -> None:
 
 
 @pytest.mark.parametrize(("gap", "is_closed"), [(3.5, True), (4.5, False)])
-def test_walked_area_closes_gaps_narrower_than_four_metres(
-    gap: float, is_closed: bool
-) -> None:
+def test_walked_area_closes_gaps_narrower_than_four_metres(gap, is_closed):
     lanes = [y for y in np.arange(0.25, 16.0, 0.5) if abs(y - 8) >= gap / 2]
     walks = [
         make_walk((0, y), (1.0, 0.0), person=k, duration=20)
@@ -370,7 +355,7 @@ def test_walked_area_closes_gaps_narrower_than_four_metres(
 
 
 @pytest.mark.parametrize(("side", "is_hole"), [(2.0, False), (6.0, True)])
-def test_walked_area_excludes_a_wide_pillar(side: float, is_hole: bool) -> None:
+def test_walked_area_excludes_a_wide_pillar(side, is_hole):
     low, high = 15 - side / 2, 15 + side / 2
     pillar = (low, low - 5, high, high - 5)
     tracks = make_hall(people=1500, pillar=pillar, size=(30, 20))
@@ -380,7 +365,7 @@ def test_walked_area_excludes_a_wide_pillar(side: float, is_hole: bool) -> None:
     assert found.area > 0.9 * (30 * 20 - is_hole * side**2)
 
 
-def test_walked_area_leaves_out_strips_narrower_than_a_metre() -> None:
+def test_walked_area_leaves_out_strips_narrower_than_a_metre():
     lanes = [
         make_walk((11, y), (1.0, 0.0), person=1000 + k, duration=8)
         for k, y in enumerate(np.linspace(3.6, 4.4, 12))
@@ -389,7 +374,7 @@ def test_walked_area_leaves_out_strips_narrower_than_a_metre() -> None:
     assert with_strip.x[1] < 15
 
 
-def test_walked_area_ignores_queues_jumps_and_ids() -> None:
+def test_walked_area_ignores_queues_jumps_and_ids():
     tracks = make_hall()
     found = szlib.walked_area(tracks)
     queue = [
@@ -408,7 +393,7 @@ def test_walked_area_ignores_queues_jumps_and_ids() -> None:
     )
 
 
-def views() -> dict[str, tuple[pd.DataFrame, shapely.Polygon]]:
+def views():
     """People in rooms and in the view of a camera, few and many, and where they can be seen."""
     oblique = shapely.Polygon([(0, 0), (16, 2), (20, 13), (-1, 11)])
     wide, few = (
@@ -434,7 +419,7 @@ def views() -> dict[str, tuple[pd.DataFrame, shapely.Polygon]]:
 
 @pytest.mark.filterwarnings("ignore:.* of the area found:szlib.DataWarning")
 @pytest.mark.parametrize("name", views())
-def test_walked_area_never_reaches_outside_where_people_can_be_seen(name: str) -> None:
+def test_walked_area_never_reaches_outside_where_people_can_be_seen(name):
     tracks, view = views()[name]
     found = szlib.walked_area(tracks)
     reached = found.polygon
@@ -443,7 +428,7 @@ def test_walked_area_never_reaches_outside_where_people_can_be_seen(name: str) -
     assert found.reason == "the outline of the place where people were seen"
 
 
-def test_walked_area_of_a_corridor_holds_its_encounters() -> None:
+def test_walked_area_of_a_corridor_holds_its_encounters():
     """Narrower than the space can turn in: the people who walk along it still meet."""
     corridor = make_hall(people=300, size=(20, 5))
     by_hand = find_encounters(corridor, area="0 20 0 5")["encounter"].nunique()
@@ -464,7 +449,7 @@ def test_walked_area_of_a_corridor_holds_its_encounters() -> None:
     )
 
 
-def test_walked_area_ignores_one_who_walks_just_outside() -> None:
+def test_walked_area_ignores_one_who_walks_just_outside():
     tracks = make_hall()
     for start in ((-0.4, 3.0), (4.0, -0.4), (12.2, 3.0), (4.0, 8.2)):
         outside = make_walk(
@@ -478,7 +463,7 @@ def test_walked_area_ignores_one_who_walks_just_outside() -> None:
         )
 
 
-def test_walked_area_moves_and_turns_with_the_tracks() -> None:
+def test_walked_area_moves_and_turns_with_the_tracks():
     found = szlib.walked_area(make_hall())
     moved = szlib.walked_area(
         make_hall().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12)
@@ -491,7 +476,7 @@ def test_walked_area_moves_and_turns_with_the_tracks() -> None:
         assert wrong < off * found.polygon.length
 
 
-def test_walked_area_with_furniture_warns() -> None:
+def test_walked_area_with_furniture_warns():
     tracks = make_hall(people=900, pillar=(5.2, 3.2, 6.8, 4.8))
     with pytest.warns(
         szlib.DataWarning,
@@ -504,7 +489,7 @@ def test_walked_area_with_furniture_warns() -> None:
         szlib.walked_area(make_hall(people=900))
 
 
-def test_tracks_without_an_area_raise() -> None:
+def test_tracks_without_an_area_raise():
     with pytest.raises(szlib.DataError, match="nobody walks"):
         szlib.walked_area(make_tracks(make_walk((0, 0), (0.1, 0))))
     with pytest.raises(szlib.DataError, match="no area was found"):
@@ -513,8 +498,8 @@ def test_tracks_without_an_area_raise() -> None:
 
 @pytest.mark.filterwarnings("ignore:.* of the area found:szlib.DataWarning")
 def test_walked_area_of_the_mall_holds_its_open_square(
-    real_tracks: pd.DataFrame,
-) -> None:
+    real_tracks,
+):
     found = szlib.walked_area(real_tracks)
     assert found.polygon.covers(szlib.ATC_SQUARE.polygon)
     assert found.area < 1400  # not the walls and shops around its corridors
@@ -524,19 +509,19 @@ def test_walked_area_of_the_mall_holds_its_open_square(
 
 
 @pytest.fixture(scope="module")
-def rooms() -> dict[str, pd.DataFrame]:
+def rooms():
     """Three rooms, each in a frame of its own."""
     sizes = {"a": (12, 8), "b": (15, 13), "c": (9, 11)}
     return {name: make_hall(size=size).assign(day=name) for name, size in sizes.items()}
 
 
-def by_day(samples: pd.DataFrame) -> dict[str, int]:
+def by_day(samples):
     return samples.groupby(samples["day"].astype(str))["encounter"].nunique().to_dict()
 
 
 def test_recordings_without_a_calendar_have_each_their_own_area(
-    rooms: dict[str, pd.DataFrame],
-) -> None:
+    rooms,
+):
     alone = {
         name: by_day(find_encounters(room, area="auto"))[name]
         for name, room in rooms.items()
@@ -553,7 +538,7 @@ def test_recordings_without_a_calendar_have_each_their_own_area(
     )
 
 
-def test_days_of_a_calendar_share_an_area(rooms: dict[str, pd.DataFrame]) -> None:
+def test_days_of_a_calendar_share_an_area(rooms):
     days = [
         room.assign(day=f"2024-05-0{k}")
         for k, room in enumerate(rooms.values(), start=1)
@@ -564,8 +549,8 @@ def test_days_of_a_calendar_share_an_area(rooms: dict[str, pd.DataFrame]) -> Non
 
 
 def test_recordings_are_placed_apart_once_and_one_place_stays(
-    rooms: dict[str, pd.DataFrame],
-) -> None:
+    rooms,
+):
     apart = place_apart(pd.concat(rooms.values(), ignore_index=True))
     pd.testing.assert_frame_equal(place_apart(apart), apart)
     spans = apart.groupby("day")["x"].agg(["min", "max"]).to_numpy()
@@ -574,8 +559,8 @@ def test_recordings_are_placed_apart_once_and_one_place_stays(
 
 
 def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
-    rooms: dict[str, pd.DataFrame], tmp_path: Path
-) -> None:
+    rooms, tmp_path
+):
     files = [tmp_path / f"{name}.csv" for name in rooms]
     for file, room in zip(files, rooms.values(), strict=True):
         room[["t", "id", "x", "y"]].to_csv(file, index=False)
@@ -600,8 +585,8 @@ def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
 
 
 def test_without_an_area_only_files_of_the_atc_mall_have_its_square(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     plaza = szlib.make_plaza(tmp_path / "plaza.csv", seed=1)
     tracks = szlib.read_tracks(plaza)
     assert find_encounters(tracks).attrs["area"] == str(szlib.ATC_SQUARE)

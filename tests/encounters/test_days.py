@@ -1,7 +1,5 @@
 """Many days: the result does not depend on order, processes or interruptions."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
@@ -12,11 +10,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import joblib
 import pandas as pd
@@ -37,7 +33,7 @@ ONE_RUN = "import sys, szlib; szlib.extract_days(sys.argv[2:], out=sys.argv[1], 
 
 
 @pytest.fixture(scope="module")
-def days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def days(tmp_path_factory):
     folder = tmp_path_factory.mktemp("days")
     return [
         make_plaza(
@@ -49,27 +45,23 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     ]
 
 
-def extract(paths: object, out: Path, **given: object) -> szlib.Extraction:
+def extract(paths, out, **given):
     return szlib.extract_days(paths, out=out, progress=False, **given)  # type: ignore[arg-type]
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder):
     """Every file of a folder, hidden ones too."""
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.fixture(scope="module")
-def reference(
-    days: list[Path], tmp_path_factory: pytest.TempPathFactory
-) -> dict[str, bytes]:
+def reference(days, tmp_path_factory):
     out = tmp_path_factory.mktemp("reference")
     assert set(extract(days, out).table["status"]) == {"done"}
     return contents(out)
 
 
-def test_samples_of_days_equal_those_of_one_table(
-    days: list[Path], tmp_path: Path
-) -> None:
+def test_samples_of_days_equal_those_of_one_table(days, tmp_path):
     ours = extract(days, tmp_path / "out").samples()
     whole = szlib.find_encounters(szlib.read_tracks(days))
     pd.testing.assert_frame_equal(
@@ -84,9 +76,7 @@ def test_samples_of_days_equal_those_of_one_table(
     )
 
 
-def test_result_does_not_depend_on_order_or_processes(
-    days: list[Path], reference: dict[str, bytes], tmp_path: Path
-) -> None:
+def test_result_does_not_depend_on_order_or_processes(days, reference, tmp_path):
     extract(days[::-1], tmp_path / "reversed")
     extract(str(days[0].parent / "*.csv"), tmp_path / "two", n_jobs=2)
     for name in ("reversed", "two"):
@@ -104,14 +94,12 @@ def test_result_does_not_depend_on_order_or_processes(
     assert zones[0].provenance == zones[1].provenance
 
 
-def test_finished_days_are_kept_and_changed_days_computed_again(
-    days: list[Path], tmp_path: Path
-) -> None:
+def test_finished_days_are_kept_and_changed_days_computed_again(days, tmp_path):
     out, copies = tmp_path / "out", [tmp_path / day.name for day in days]
     for copy, day in zip(copies, days, strict=True):
         copy.write_bytes(day.read_bytes())
 
-    def statuses(**given: object) -> list[str]:
+    def statuses(**given):
         return list(extract(given.pop("paths", copies), out, **given).table["status"])
 
     assert statuses(paths=copies[:3]) == ["done"] * 3
@@ -141,7 +129,7 @@ def test_finished_days_are_kept_and_changed_days_computed_again(
 
 
 @contextmanager
-def other_folder(file: Path) -> Iterator[None]:
+def other_folder(file):
     """Give the folder of `file` the name of its neighbour "other", and back; no file is touched."""
     data, other, away = (file.parents[1] / name for name in ("data", "other", "away"))
     for old, new in ((data, away), (other, data)):
@@ -152,7 +140,7 @@ def other_folder(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def other_file(file: Path) -> Iterator[None]:
+def other_file(file):
     """Replace `file` by its namesake in the folder "other", and put it back."""
     away, other = file.with_name("away"), file.parents[1] / "other" / file.name
     os.link(file, away)
@@ -163,7 +151,7 @@ def other_file(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def other_content(file: Path) -> Iterator[None]:
+def other_content(file):
     """Write the content of its namesake into `file`, then its own, with the old time of change."""
     content, before = file.read_bytes(), file.stat()
     file.write_bytes((file.parents[1] / "other" / file.name).read_bytes())
@@ -174,12 +162,12 @@ def other_content(file: Path) -> Iterator[None]:
 
 @pytest.mark.parametrize("exchange", [other_folder, other_file, other_content])
 def test_rows_are_of_the_bytes_of_their_checksum(
-    exchange: Callable[[Path], AbstractContextManager[None]],
-    days: list[Path],
-    reference: dict[str, bytes],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    exchange,
+    days,
+    reference,
+    tmp_path,
+    monkeypatch,
+):
     """The file is another one from the moment that its checksum is known until its rows are read."""
     for name, day in (("data", days[0]), ("other", days[1])):
         (tmp_path / name).mkdir()
@@ -187,13 +175,13 @@ def test_rows_are_of_the_bytes_of_their_checksum(
     file, known = tmp_path / "data" / days[0].name, threading.Event()
     describe, read = extraction.describe_source, extraction.read_raw
 
-    def describe_first(*given: Any) -> dict[str, Any]:
+    def describe_first(*given):
         try:
             return describe(*given)
         finally:
             known.set()
 
-    def read_the_other(*given: Any, **options: Any) -> pd.DataFrame:
+    def read_the_other(*given, **options):
         known.wait()
         with exchange(file):
             return read(*given, **options)
@@ -214,13 +202,13 @@ def test_rows_are_of_the_bytes_of_their_checksum(
 
 
 def test_day_whose_file_changes_after_the_area_was_found_fails(
-    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    days, tmp_path, monkeypatch
+):
     copies = [tmp_path / day.name for day in days[:2]]
     for copy, day in zip(copies, days, strict=False):
         copy.write_bytes(day.read_bytes())
 
-    def change_and_run(*given: Any, **options: Any) -> object:
+    def change_and_run(*given, **options):
         last = copies[0].read_bytes().splitlines(keepends=True)[-1]
         copies[0].write_bytes(copies[0].read_bytes() + last)
         return run_tasks(*given, **options)
@@ -234,9 +222,7 @@ def test_day_whose_file_changes_after_the_area_was_found_fails(
     assert "changed after its day or the area was found" in done.failed["why"].item()
 
 
-def test_days_that_fail_do_not_stop_the_others(
-    days: list[Path], tmp_path: Path
-) -> None:
+def test_days_that_fail_do_not_stop_the_others(days, tmp_path):
     (tmp_path / "atc-20121107.csv").write_text(
         "1352246400.0,1,2,3,4,5,6,7\n" + "rubbish\n" * 5
     )
@@ -250,7 +236,7 @@ def test_days_that_fail_do_not_stop_the_others(
     assert list(done.samples()["day"].cat.categories) == list(DATES[:2])
 
 
-def test_files_of_one_date_make_one_day(days: list[Path], tmp_path: Path) -> None:
+def test_files_of_one_date_make_one_day(days, tmp_path):
     lines = days[0].read_text().splitlines(keepends=True)
     for part in range(
         2
@@ -262,9 +248,7 @@ def test_files_of_one_date_make_one_day(days: list[Path], tmp_path: Path) -> Non
     pd.testing.assert_frame_equal(pieces.samples(), whole, check_exact=True)
 
 
-def test_day_without_encounters_gives_an_empty_table(
-    days: list[Path], tmp_path: Path
-) -> None:
+def test_day_without_encounters_gives_an_empty_table(days, tmp_path):
     far = extract(
         days[:2], tmp_path / "far", square=szlib.Square(x=(500, 520), y=(500, 520))
     )
@@ -277,9 +261,7 @@ def test_day_without_encounters_gives_an_empty_table(
 
 
 @pytest.mark.parametrize("empty", [0, 1])
-def test_day_without_encounters_changes_no_type_of_the_others(
-    days: list[Path], tmp_path: Path, empty: int
-) -> None:
+def test_day_without_encounters_changes_no_type_of_the_others(days, tmp_path, empty):
     rows = pd.read_csv(days[empty], header=None)
     rows[2] += 500_000  # x [mm]: far from the area
     far = tmp_path / days[empty].name
@@ -299,16 +281,12 @@ def test_day_without_encounters_changes_no_type_of_the_others(
         ({"file_format": "csv"}, "file_format must be .*; got 'csv'"),
     ],
 )
-def test_invalid_parameters_raise(
-    days: list[Path], tmp_path: Path, given: dict[str, object], message: str
-) -> None:
+def test_invalid_parameters_raise(days, tmp_path, given, message):
     with pytest.raises(szlib.DataError, match=message):
         extract(days, tmp_path / "out", **given)
 
 
-def test_output_or_input_that_does_not_exist_raises(
-    days: list[Path], tmp_path: Path
-) -> None:
+def test_output_or_input_that_does_not_exist_raises(days, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(szlib.DataError, match="cannot be made"):
         extract(days, tmp_path / "file" / "out")
@@ -316,9 +294,7 @@ def test_output_or_input_that_does_not_exist_raises(
         extract(tmp_path / "nothing.csv", tmp_path / "out")
 
 
-def test_full_disk_is_reported_and_earlier_days_stay_intact(
-    days: list[Path], reference: dict[str, bytes], tmp_path: Path
-) -> None:
+def test_full_disk_is_reported_and_earlier_days_stay_intact(days, reference, tmp_path):
     extract(days[:2], tmp_path)
     before = contents(tmp_path)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -336,7 +312,7 @@ def test_full_disk_is_reported_and_earlier_days_stay_intact(
     assert contents(tmp_path) == reference
 
 
-def test_read_only_output_fails_each_day(days: list[Path], tmp_path: Path) -> None:
+def test_read_only_output_fails_each_day(days, tmp_path):
     claim_folder(tmp_path / "out", extraction.PURPOSE)
     with FaultyDisk(0, errno.EROFS):
         refused = extract(days[:1], tmp_path / "out")
@@ -345,9 +321,7 @@ def test_read_only_output_fails_each_day(days: list[Path], tmp_path: Path) -> No
         refused.samples()
 
 
-def kill_and_resume(
-    days: list[Path], out: Path, reference: dict[str, bytes], kills: int, seed: int
-) -> int:
+def kill_and_resume(days, out, reference, kills, seed):
     """Kill runs at random moments, each with its processes; then let one finish. How often it struck."""
     rng, struck, longest = random.Random(seed), 0, 4.0
     for _ in range(kills):
@@ -384,7 +358,7 @@ def kill_and_resume(
     return struck
 
 
-def contents_after_an_hour(days: list[Path], out: Path) -> dict[str, bytes]:
+def contents_after_an_hour(days, out):
     """The files of a folder, extracted again when the unfinished files of killed processes are old."""
     for unfinished in out.glob(".szlib-part-*"):
         os.utime(unfinished, (0, 0))
@@ -392,27 +366,23 @@ def contents_after_an_hour(days: list[Path], out: Path) -> dict[str, bytes]:
     return contents(out)
 
 
-def test_killed_runs_resume_to_the_same_result(
-    days: list[Path], reference: dict[str, bytes], tmp_path: Path
-) -> None:
+def test_killed_runs_resume_to_the_same_result(days, reference, tmp_path):
     assert kill_and_resume(days, tmp_path / "out", reference, kills=2, seed=1) > 0
 
 
-def test_killed_worker_raises(
-    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_killed_worker_raises(days, tmp_path, monkeypatch):
     monkeypatch.setattr(extraction, "extract_day", _die)
     with pytest.raises(szlib.SzlibError, match="a worker process was killed"):
         extract(days, tmp_path / "out", n_jobs=2)
 
 
-def _die(*_: object) -> None:
+def _die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_dask_cluster_that_loses_a_worker_gives_the_same_result(
-    days: list[Path], reference: dict[str, bytes], tmp_path: Path
-) -> None:
+    days, reference, tmp_path
+):
     """In a process of its own: the cluster leaves sockets and threads behind."""
     pytest.importorskip("distributed")
     program = tmp_path / "program.py"
@@ -445,15 +415,13 @@ def test_dask_cluster_that_loses_a_worker_gives_the_same_result(
     assert contents_after_an_hour(days, out) == reference
 
 
-def test_another_backend_of_joblib_gives_the_same_result(
-    days: list[Path], reference: dict[str, bytes], tmp_path: Path
-) -> None:
+def test_another_backend_of_joblib_gives_the_same_result(days, reference, tmp_path):
     with joblib.parallel_config("threading"):
         extract(days, tmp_path, n_jobs=2)
     assert contents(tmp_path) == reference
 
 
-def test_extraction_is_loaded_from_its_folder(days: list[Path], tmp_path: Path) -> None:
+def test_extraction_is_loaded_from_its_folder(days, tmp_path):
     made = extract(days, tmp_path / "out", min_speed=0.5, max_gap=0.7)
     loaded = szlib.Extraction.load(tmp_path / "out")
     pd.testing.assert_frame_equal(loaded.samples(), made.samples(), check_exact=True)
@@ -466,9 +434,7 @@ def test_extraction_is_loaded_from_its_folder(days: list[Path], tmp_path: Path) 
     assert set(some.samples()["day"]) == {DATES[3]}
 
 
-def test_folder_without_extracted_days_is_refused(
-    days: list[Path], tmp_path: Path
-) -> None:
+def test_folder_without_extracted_days_is_refused(days, tmp_path):
     with pytest.raises(szlib.DataError, match="holds no extracted days"):
         szlib.Extraction.load(tmp_path)
     extract(days[:1], tmp_path / "out")
@@ -478,9 +444,7 @@ def test_folder_without_extracted_days_is_refused(
         szlib.Extraction.load(tmp_path / "out")
 
 
-def test_days_of_different_settings_are_not_mixed(
-    days: list[Path], tmp_path: Path
-) -> None:
+def test_days_of_different_settings_are_not_mixed(days, tmp_path):
     extract(days[:1], tmp_path / "out", min_speed=0.5)
     extract(days[1:2], tmp_path / "out", min_speed=0.6)
     message = f"{DATES[1]} was extracted with other settings than {DATES[0]}"

@@ -1,7 +1,5 @@
 """Encounters: the search agrees with plain loops, and frame, labels and order do not matter."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -15,7 +13,7 @@ from plots import reference_frame
 import szlib
 from szlib.encounters import occupants
 from szlib.encounters.finding import find_encounters
-from szlib.encounters.geometry import Area, AttentionalSpace, Square, wrap_angle
+from szlib.encounters.geometry import AttentionalSpace, Square, wrap_angle
 from szlib.encounters.occupants import SAMPLE_COLUMNS
 from szlib.tracks import funnels
 
@@ -37,19 +35,19 @@ VARIANTS = {
 
 
 @pytest.fixture(scope="module")
-def crowd() -> pd.DataFrame:
+def crowd():
     return make_crowd(77, people=160, seconds=200, square=ROOM)
 
 
 @pytest.fixture(scope="module")
-def known(crowd: pd.DataFrame) -> pd.DataFrame:
+def known(crowd):
     return find_encounters(crowd, square=ROOM)
 
 
 # --- the four conditions in plain loops --------------------------------------------------------------
 
 
-def in_frame(person: tuple, point: tuple) -> tuple[float, float]:
+def in_frame(person, point):
     """A point of the world seen by a person (x, y, vx, vy)."""
     heading = math.atan2(person[3], person[2])
     dx, dy = point[0] - person[0], point[1] - person[1]
@@ -60,22 +58,22 @@ def in_frame(person: tuple, point: tuple) -> tuple[float, float]:
 
 
 def search(
-    tracks: pd.DataFrame,
+    tracks,
     *,
-    square: Area,
-    space: AttentionalSpace = AHEAD,
-    duration: float = 3.0,
-    min_distance: float = 1.0,
-    min_speed: float = 0.4,
-    throughout: bool = False,
-) -> pd.DataFrame:
+    square,
+    space=AHEAD,
+    duration=3.0,
+    min_distance=1.0,
+    min_speed=0.4,
+    throughout=False,
+):
     """Every sample of every encounter, straight from the four conditions."""
     near, far = (
         (-space.length / 2, space.length / 2) if space.centred else (0.0, space.length)
     )
     side = space.width / 2
-    people: dict[tuple, list[int]] = {}  # (day, id): ticks
-    scene: dict[tuple, dict[int, tuple]] = {}  # (day, tick): who is where
+    people = {}  # (day, id): ticks
+    scene = {}  # (day, tick): who is where
     for row in tracks.itertuples():
         tick = round(row.t * 10)
         people.setdefault((str(row.day), row.id), []).append(tick)
@@ -86,7 +84,7 @@ def search(
             row.vy,
         )
 
-    def walks_within(person: tuple) -> bool:
+    def walks_within(person):
         if not math.hypot(person[2], person[3]) >= min_speed:
             return False
         heading = math.atan2(person[3], person[2])
@@ -100,7 +98,7 @@ def search(
                     return False
         return True
 
-    def occupants(now: dict[int, tuple], ref: int) -> set[int]:
+    def occupants(now, ref):
         seen = {other: in_frame(now[ref], now[other]) for other in now if other != ref}
         return {
             o
@@ -108,7 +106,7 @@ def search(
             if near <= ahead <= far and abs(left) <= side
         }
 
-    def met_from(day: str, ref: int, window: range) -> int | None:
+    def met_from(day, ref, window):
         now = scene[day, window[0]]
         if not walks_within(now[ref]) or len(met := occupants(now, ref)) != 1:
             return None
@@ -152,7 +150,7 @@ def search(
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_encounters_agree_with_plain_loops(variant: str) -> None:
+def test_encounters_agree_with_plain_loops(variant):
     options = {"square": szlib.ATC_SQUARE, **VARIANTS[variant]}
     found = 0
     for seed in range(16):
@@ -163,9 +161,7 @@ def test_encounters_agree_with_plain_loops(variant: str) -> None:
     assert found >= 5  # or nothing was compared
 
 
-def test_encounters_agree_with_plain_loops_in_a_larger_room(
-    crowd: pd.DataFrame, known: pd.DataFrame
-) -> None:
+def test_encounters_agree_with_plain_loops_in_a_larger_room(crowd, known):
     assert known["encounter"].nunique() >= 20
     assert_same_samples(known, search(crowd, square=ROOM))
 
@@ -174,9 +170,7 @@ def test_encounters_agree_with_plain_loops_in_a_larger_room(
 
 
 @pytest.mark.parametrize("quarters", [1, 2, 3])
-def test_encounters_move_and_turn_with_the_world(
-    crowd: pd.DataFrame, known: pd.DataFrame, quarters: int
-) -> None:
+def test_encounters_move_and_turn_with_the_world(crowd, known, quarters):
     turn = np.linalg.matrix_power([[0, -1], [1, 0]], quarters)
     moved = crowd.copy()
     moved[["x", "y"]] = crowd[["x", "y"]].to_numpy() @ turn.T + [3.0, -7.0]
@@ -186,27 +180,21 @@ def test_encounters_move_and_turn_with_the_world(
     )
 
 
-def test_mirror_reverses_the_sign_of_los_angle(
-    crowd: pd.DataFrame, known: pd.DataFrame
-) -> None:
+def test_mirror_reverses_the_sign_of_los_angle(crowd, known):
     mirrored = crowd.assign(y=-crowd["y"], vy=-crowd["vy"])
     expected = known.assign(los_angle=-known["los_angle"])
     assert_same_samples(find_encounters(mirrored, square=ROOM), expected)
     assert (known["los_angle"] < 0).any()
 
 
-def test_row_order_does_not_matter_and_input_is_unchanged(
-    crowd: pd.DataFrame, known: pd.DataFrame
-) -> None:
+def test_row_order_does_not_matter_and_input_is_unchanged(crowd, known):
     shuffled = crowd.sample(frac=1, random_state=5)
     before = shuffled.copy(deep=True)
     pd.testing.assert_frame_equal(find_encounters(shuffled, square=ROOM), known)
     pd.testing.assert_frame_equal(shuffled, before)
 
 
-def test_ids_and_day_names_do_not_matter(
-    crowd: pd.DataFrame, known: pd.DataFrame
-) -> None:
+def test_ids_and_day_names_do_not_matter(crowd, known):
     names = {person: f"p{person:04d}" for person in crowd["id"].unique()}
     renamed = find_encounters(crowd.assign(id=crowd["id"].map(names)), square=ROOM)
     expected = known.assign(
@@ -224,7 +212,7 @@ def test_ids_and_day_names_do_not_matter(
     )
 
 
-def test_days_separately_and_together_give_the_same() -> None:
+def test_days_separately_and_together_give_the_same():
     days = {f"2012-10-2{k}": make_crowd(k, people=20) for k in range(1, 6)}
     together = make_tracks(
         *(tracks.assign(day=day) for day, tracks in reversed(days.items()))
@@ -239,17 +227,13 @@ def test_days_separately_and_together_give_the_same() -> None:
     assert_same_samples(find_encounters(together, **place), expected)
 
 
-def test_block_size_does_not_matter(
-    crowd: pd.DataFrame, known: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_block_size_does_not_matter(crowd, known, monkeypatch):
     for pairs in (40, 3001):
         monkeypatch.setattr(occupants, "_AT_ONCE", pairs)
         pd.testing.assert_frame_equal(find_encounters(crowd, square=ROOM), known)
 
 
-def test_every_encounter_meets_the_four_conditions(
-    crowd: pd.DataFrame, known: pd.DataFrame
-) -> None:
+def test_every_encounter_meets_the_four_conditions(crowd, known):
     assert (known.groupby("encounter").size() == 31).all()
     assert known["encounter"].is_monotonic_increasing
     assert known.equals(known.sort_values(["day", "ref_id", "t"], ignore_index=True))
@@ -266,7 +250,7 @@ def test_every_encounter_meets_the_four_conditions(
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_the_funnel_adds_up(crowd: pd.DataFrame, variant: str) -> None:
+def test_the_funnel_adds_up(crowd, variant):
     samples = find_encounters(crowd, square=ROOM, **VARIANTS[variant])
     ticks, windows = funnels.get(samples)
     assert ticks["entered"] == len(crowd)
@@ -279,7 +263,7 @@ def test_the_funnel_adds_up(crowd: pd.DataFrame, variant: str) -> None:
 # --- scenes made by hand -----------------------------------------------------------------------------
 
 
-def reasons(samples: pd.DataFrame) -> dict[str, int]:
+def reasons(samples):
     return {
         reason: count
         for stage in funnels.get(samples)
@@ -287,7 +271,7 @@ def reasons(samples: pd.DataFrame) -> dict[str, int]:
     }
 
 
-def test_two_people_who_meet_are_two_encounters() -> None:
+def test_two_people_who_meet_are_two_encounters():
     """Both keep to their right, so each has the other on the left, and behind in the end."""
     east = make_walk((-2.0, -0.5), (1.2, 0.0), person=1, duration=3.0)
     west = make_walk((2.0, 0.5), (-1.2, 0.0), person=2, duration=3.0)
@@ -307,7 +291,7 @@ def test_two_people_who_meet_are_two_encounters() -> None:
     assert samples["los_angle"].max() > np.pi / 2
 
 
-def test_throughout_excludes_people_who_pass() -> None:
+def test_throughout_excludes_people_who_pass():
     east = make_walk((-2.0, -0.5), (1.2, 0.0), person=1, duration=3.0)
     west = make_walk((2.0, 0.5), (-1.2, 0.0), person=2, duration=3.0)
     samples = find_encounters(make_tracks(east, west), square=ROOM, throughout=True)
@@ -319,7 +303,7 @@ FOLLOWED = make_walk((3.0, 0.2), (1.0, 0.0), person=2, duration=3.0)
 FOLLOWER = make_walk((0.0, 0.0), (1.0, 0.0), person=1, duration=3.0)
 
 
-def test_only_the_follower_has_an_encounter() -> None:
+def test_only_the_follower_has_an_encounter():
     samples = find_encounters(make_tracks(FOLLOWER, FOLLOWED), square=ROOM)
     assert set(samples["ref_id"]) == {1}
     np.testing.assert_allclose(samples["los_angle"], math.atan2(0.2, 3.0))
@@ -333,7 +317,7 @@ def test_only_the_follower_has_an_encounter() -> None:
     np.testing.assert_allclose(behind, wrap_angle(np.array(math.atan2(-0.2, -3.0))))
 
 
-def test_los_angle_straight_behind_is_plus_pi() -> None:
+def test_los_angle_straight_behind_is_plus_pi():
     behind = make_walk((-1.5, 0.0), (1.0, 0.0), person=2, duration=3.0)
     samples = find_encounters(make_tracks(FOLLOWER, behind), square=ROOM, space=AROUND)
     np.testing.assert_array_equal(
@@ -391,7 +375,7 @@ SPOILED = {
 
 
 @pytest.mark.parametrize("scene", SPOILED)
-def test_funnel_names_the_failed_condition(scene: str) -> None:
+def test_funnel_names_the_failed_condition(scene):
     people, reason = SPOILED[scene]
     samples = find_encounters(make_tracks(*people), square=ROOM)
     assert len(samples[samples["ref_id"] == 1]) == 0
@@ -406,9 +390,7 @@ def test_funnel_names_the_failed_condition(scene: str) -> None:
         (3.05, 20.0, "not in the area"),
     ],
 )
-def test_funnel_names_a_space_that_leaves_the_area(
-    low: float, high: float, reason: str
-) -> None:
+def test_funnel_names_a_space_that_leaves_the_area(low, high, reason):
     """The far corners of the follower's space go from 5 to 8 m."""
     tracks = make_tracks(FOLLOWER, FOLLOWED)
     assert len(find_encounters(tracks, square=Square(x=(-1, 8.1), y=(-2.1, 2.1)))) == 31
@@ -418,7 +400,7 @@ def test_funnel_names_a_space_that_leaves_the_area(
     assert len(find_encounters(tracks, square=Square(x=(-1, 8.1), y=(-1.9, 2.1)))) == 0
 
 
-def test_people_outside_the_area_are_not_in_the_space() -> None:
+def test_people_outside_the_area_are_not_in_the_space():
     """They cannot be: the space lies inside the square."""
     outside = make_walk((3.0, 2.2), (1.0, 0.0), person=3, duration=3.0)
     square = Square(x=(-1, 9), y=(-2.1, 2.1))
@@ -428,7 +410,7 @@ def test_people_outside_the_area_are_not_in_the_space() -> None:
     )
 
 
-def test_windows_follow_each_other_without_overlap() -> None:
+def test_windows_follow_each_other_without_overlap():
     """A long walk behind somebody: 31 samples each, the next begins at the tick after."""
     follower = make_walk((-18.0, 0.0), (1.0, 0.0), person=1, duration=12.35)
     followed = make_walk((-15.0, 0.0), (1.0, 0.0), person=2, duration=12.35)
@@ -438,7 +420,7 @@ def test_windows_follow_each_other_without_overlap() -> None:
     assert reasons(samples)["overlaps an earlier window"] == len(follower) - 30 - 4
 
 
-def test_other_person_can_change_between_windows_only() -> None:
+def test_other_person_can_change_between_windows_only():
     """One leaves the space to the side after 1 s, then another comes in."""
     walks = [
         make_walk((0, 0), (1, 0), person=1, duration=3.0),
@@ -452,7 +434,7 @@ def test_other_person_can_change_between_windows_only() -> None:
     assert alone["ref_id"].tolist() == [1] * 31
 
 
-def test_same_id_on_another_day_is_another_person() -> None:
+def test_same_id_on_another_day_is_another_person():
     yesterday = FOLLOWED.assign(day="2012-10-23", id=3, y=0.0)
     for there in (yesterday, yesterday.head(1)):
         samples = find_encounters(make_tracks(there, FOLLOWER, FOLLOWED), square=ROOM)
@@ -460,7 +442,7 @@ def test_same_id_on_another_day_is_another_person() -> None:
         assert len(samples) == 31
 
 
-def test_a_person_whose_id_changes_is_two_people() -> None:
+def test_a_person_whose_id_changes_is_two_people():
     """The tracker loses the follower and goes on with the next id, at the next tick."""
     relabelled = FOLLOWER.assign(id=FOLLOWER["id"].where(FOLLOWER["t"] < 1.55, 2))
     samples = find_encounters(
@@ -473,7 +455,7 @@ def test_a_person_whose_id_changes_is_two_people() -> None:
 # --- nothing, and nonsense ---------------------------------------------------------------------------
 
 
-def test_no_encounter_gives_an_empty_table_with_all_columns() -> None:
+def test_no_encounter_gives_an_empty_table_with_all_columns():
     full = find_encounters(make_tracks(FOLLOWER, FOLLOWED), square=ROOM)
     for tracks in (make_tracks(FOLLOWER), make_tracks(FOLLOWER.assign(x=99.0))):
         empty = find_encounters(tracks, square=ROOM)
@@ -496,12 +478,12 @@ def test_no_encounter_gives_an_empty_table_with_all_columns() -> None:
         ({"min_speed": np.nan}, "min_speed"),
     ],
 )
-def test_invalid_parameters_raise(options: dict, message: str) -> None:
+def test_invalid_parameters_raise(options, message):
     with pytest.raises(szlib.DataError, match=message):
         find_encounters(make_tracks(FOLLOWER, FOLLOWED), square=ROOM, **options)
 
 
-def test_invalid_tables_raise() -> None:
+def test_invalid_tables_raise():
     tracks = make_tracks(FOLLOWER, FOLLOWED)
     for message, table in {
         r"columns \['vx'\] are missing": tracks.drop(columns="vx"),
@@ -515,7 +497,7 @@ def test_invalid_tables_raise() -> None:
 
 
 @pytest.mark.parametrize("x", [(1, 1), (2, 1), (0, np.nan), (-np.inf, 0)])
-def test_squares_without_an_inside_raise(x: tuple[float, float]) -> None:
+def test_squares_without_an_inside_raise(x):
     with pytest.raises(szlib.DataError, match="x and y of a square must be finite"):
         Square(x=x, y=(0, 1))
     with pytest.raises(szlib.DataError, match="x and y of a square must be finite"):
@@ -523,7 +505,7 @@ def test_squares_without_an_inside_raise(x: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("sides", [(0, 4), (5, -1), (np.nan, 4), (5, np.inf)])
-def test_spaces_without_an_inside_raise(sides: tuple[float, float]) -> None:
+def test_spaces_without_an_inside_raise(sides):
     with pytest.raises(
         szlib.DataError, match="of an attentional space must be positive"
     ):
@@ -533,7 +515,7 @@ def test_spaces_without_an_inside_raise(sides: tuple[float, float]) -> None:
 # --- shapes and angles -------------------------------------------------------------------------------
 
 
-def test_corners_lie_on_the_border_of_the_space() -> None:
+def test_corners_lie_on_the_border_of_the_space():
     for space in (AHEAD, AROUND, AttentionalSpace(2.0, 6.0)):
         corners = space.corners
         assert np.ptp(corners, axis=0).tolist() == [space.length, space.width]
@@ -545,7 +527,7 @@ def test_corners_lie_on_the_border_of_the_space() -> None:
     np.testing.assert_array_equal(AROUND.corners.mean(axis=0), 0)
 
 
-def test_wrap_angle_keeps_the_direction() -> None:
+def test_wrap_angle_keeps_the_direction():
     angles = np.concatenate([np.linspace(-20, 20, 1001), np.pi * np.arange(-6, 7)])
     wrapped = wrap_angle(angles)
     np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * angles), atol=1e-12)
@@ -556,7 +538,7 @@ def test_wrap_angle_keeps_the_direction() -> None:
 # --- the reference frame -----------------------------------------------------------------------------
 
 
-def test_paths_in_the_reference_frame(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_paths_in_the_reference_frame(crowd, known):
     paths = reference_frame(crowd.sample(frac=1, random_state=1), known)
     assert paths[["encounter", "t"]].equals(known[["encounter", "t"]])
     opening = ~known["encounter"].duplicated()
@@ -571,16 +553,12 @@ def test_paths_in_the_reference_frame(crowd: pd.DataFrame, known: pd.DataFrame) 
 
 
 @pytest.mark.parametrize("column", SAMPLE_COLUMNS[:5])
-def test_paths_need_the_people_and_times_of_the_samples(
-    crowd: pd.DataFrame, known: pd.DataFrame, column: str
-) -> None:
+def test_paths_need_the_people_and_times_of_the_samples(crowd, known, column):
     with pytest.raises(szlib.DataError, match=rf"columns \['{column}'\] are missing"):
         reference_frame(crowd, known.drop(columns=column))
 
 
-def test_paths_follow_the_order_of_the_samples(
-    crowd: pd.DataFrame, known: pd.DataFrame
-) -> None:
+def test_paths_follow_the_order_of_the_samples(crowd, known):
     expected = reference_frame(crowd, known)
     shuffled = known.sample(frac=1, random_state=2)
     again = reference_frame(crowd, shuffled)
@@ -589,9 +567,7 @@ def test_paths_follow_the_order_of_the_samples(
     )
 
 
-def test_samples_of_other_tracks_raise(
-    crowd: pd.DataFrame, known: pd.DataFrame
-) -> None:
+def test_samples_of_other_tracks_raise(crowd, known):
     with pytest.raises(
         szlib.DataError, match=r"row .*got .*; this sample is not in these tracks"
     ):
@@ -604,8 +580,8 @@ def test_samples_of_other_tracks_raise(
 
 
 def test_the_real_day_has_about_as_many_encounters_as_the_paper(
-    real_samples: pd.DataFrame,
-) -> None:
+    real_samples,
+):
     """The paper: 16,181 in 92 days, 176 a day."""
     assert 100 <= real_samples["encounter"].nunique() <= 400
     assert (real_samples["los_angle"].abs() > np.pi / 2).any()
@@ -615,7 +591,7 @@ def test_the_real_day_has_about_as_many_encounters_as_the_paper(
         )
 
 
-def test_plain_loops_agree_on_the_real_day(real_tracks: pd.DataFrame) -> None:
+def test_plain_loops_agree_on_the_real_day(real_tracks):
     here = real_tracks[
         szlib.ATC_SQUARE.contains(
             real_tracks["x"].to_numpy(), real_tracks["y"].to_numpy()
@@ -626,7 +602,7 @@ def test_plain_loops_agree_on_the_real_day(real_tracks: pd.DataFrame) -> None:
     assert_same_samples(samples, search(here, square=szlib.ATC_SQUARE))
 
 
-def test_the_papers_conditions_are_the_defaults() -> None:
+def test_the_papers_conditions_are_the_defaults():
     """A space of 4 m x 5 m, 3 s, 1 m, 0.4 m/s (sec. 2)."""
     space = szlib.AttentionalSpace(length=5.0, width=4.0)
     papers = {"space": space, "duration": 3.0, "min_distance": 1.0, "min_speed": 0.4}

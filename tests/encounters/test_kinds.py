@@ -1,9 +1,5 @@
 """Kinds of encounter: constructed walks, invariances, and people whose companions are known."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,7 +16,7 @@ ROOM = szlib.Square(x=(-20, 20), y=(-20, 20))
 
 
 @pytest.fixture(scope="module")
-def crowd() -> pd.DataFrame:
+def crowd():
     """Several days of people who wander about."""
     days = [
         make_crowd(day, people=60, seconds=60, square=ROOM).assign(
@@ -34,9 +30,7 @@ def crowd() -> pd.DataFrame:
 PAIR = pd.DataFrame({"day": [DAY], "ref_id": [1], "other_id": [2]})
 
 
-def two(
-    *walks: tuple[tuple[float, float], tuple[float, float]], duration: float = 12.0
-) -> pd.DataFrame:
+def two(*walks, duration=12.0):
     return make_tracks(
         *(
             make_walk(start, velocity, person=1 + at, duration=duration)
@@ -70,12 +64,12 @@ WALKS = {
 
 
 @pytest.mark.parametrize("name", WALKS)
-def test_constructed_walks_have_their_kind(name: str) -> None:
+def test_constructed_walks_have_their_kind(name):
     tracks, kind = WALKS[name]
     assert list(encounter_kinds(tracks, PAIR)) == [kind]
 
 
-def turned(tracks: pd.DataFrame) -> pd.DataFrame:
+def turned(tracks):
     turn = np.array([[0.6, -0.8], [0.8, 0.6]])
     moved = tracks.copy()
     moved[["x", "y"]] = tracks[["x", "y"]].to_numpy() @ turn.T + [40.0, -7.0]
@@ -83,7 +77,7 @@ def turned(tracks: pd.DataFrame) -> pd.DataFrame:
     return moved
 
 
-SAME_WORLD: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
+SAME_WORLD = {
     "turned and moved": turned,
     "mirrored": lambda tracks: tracks.assign(y=-tracks["y"], vy=-tracks["vy"]),
     "rows in any order": lambda tracks: tracks.sample(frac=1, random_state=3),
@@ -99,7 +93,7 @@ SAME_WORLD: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
 
 @pytest.mark.parametrize("change", SAME_WORLD)
 @pytest.mark.parametrize("name", WALKS)
-def test_kind_is_invariant(name: str, change: str) -> None:
+def test_kind_is_invariant(name, change):
     tracks, kind = WALKS[name]
     tracks = SAME_WORLD[change](tracks)
     both = pd.concat(
@@ -110,7 +104,7 @@ def test_kind_is_invariant(name: str, change: str) -> None:
     )
 
 
-def test_kind_belongs_to_the_pair_and_its_common_track(crowd: pd.DataFrame) -> None:
+def test_kind_belongs_to_the_pair_and_its_common_track(crowd):
     samples = find_encounters(crowd, square=ROOM)
     kinds = samples.groupby("encounter")[["day", "ref_id", "other_id", "kind"]].first()
     assert set(kinds["kind"]) >= {"same direction", "opposite", "crossing", "standing"}
@@ -130,7 +124,7 @@ def test_kind_belongs_to_the_pair_and_its_common_track(crowd: pd.DataFrame) -> N
     )
 
 
-def test_kinds_agree_with_plain_loops(crowd: pd.DataFrame) -> None:
+def test_kinds_agree_with_plain_loops(crowd):
     samples = find_encounters(crowd, square=ROOM)
     room = szlib.Square(x=(-20 - REACH, 20 + REACH), y=(-20 - REACH, 20 + REACH))
     inside = crowd[room.contains(crowd["x"], crowd["y"])]
@@ -163,7 +157,7 @@ def test_kinds_agree_with_plain_loops(crowd: pd.DataFrame) -> None:
         assert one["kind"] == expected
 
 
-def test_rows_beyond_the_reach_do_not_count() -> None:
+def test_rows_beyond_the_reach_do_not_count():
     tracks = two(((-17, 0), (1.2, 0)), ((-17, 1.2), (1.2, 0)))  # for 12 s, to x = -2.6
     assert list(
         encounter_kinds(tracks, PAIR, area=szlib.Square(x=(0, 20), y=(-5, 5)))
@@ -178,14 +172,14 @@ def test_rows_beyond_the_reach_do_not_count() -> None:
     )
 
 
-def test_people_without_a_common_track_have_no_kind() -> None:
+def test_people_without_a_common_track_have_no_kind():
     tracks = make_tracks(
         make_walk((0, 0), (1, 0)), make_walk((0, 0), (1, 0), person=2, begin=60.0)
     )
     assert encounter_kinds(tracks, PAIR).isna().all()
 
 
-def test_of_kind_selects_kinds_and_counts_the_others(crowd: pd.DataFrame) -> None:
+def test_of_kind_selects_kinds_and_counts_the_others(crowd):
     everybody = find_encounters(crowd, square=ROOM)
     strangers = find_encounters(crowd, square=ROOM, kinds="strangers")
     pd.testing.assert_frame_equal(strangers, everybody[everybody["kind"] != COMPANIONS])
@@ -202,7 +196,7 @@ def test_of_kind_selects_kinds_and_counts_the_others(crowd: pd.DataFrame) -> Non
     }
 
 
-def test_invalid_kinds_and_pairs_raise() -> None:
+def test_invalid_kinds_and_pairs_raise():
     tracks, _ = WALKS["in line"]
     with pytest.raises(
         szlib.DataError, match="unknown kinds 'friends'; expected some of"
@@ -217,7 +211,7 @@ def test_invalid_kinds_and_pairs_raise() -> None:
 # --- people whose companions are known ---------------------------------------------------------------
 
 
-def confusion(tracks: pd.DataFrame, groups: pd.DataFrame) -> tuple[int, int, int, int]:
+def confusion(tracks, groups):
     """Pairs that are there together for 2 s or more: (pairs, companions, found, found and companions)."""
     seen = tracks.groupby("id")["t"].agg(["min", "max"])
     begin, end = seen["min"].to_numpy(), seen["max"].to_numpy()
@@ -236,7 +230,7 @@ def confusion(tracks: pd.DataFrame, groups: pd.DataFrame) -> tuple[int, int, int
     return len(pairs), int(true.sum()), int(found.sum()), int((found & true).sum())
 
 
-def test_groups_of_the_eth_sequence_are_found() -> None:
+def test_groups_of_the_eth_sequence_are_found():
     folder = real_data("eth")
     with pytest.warns(szlib.DataWarning, match="share people"):
         groups = sites.read_groups(folder / "seq_eth_groups.txt")
@@ -252,7 +246,7 @@ def test_groups_of_the_eth_sequence_are_found() -> None:
     )
 
 
-def test_groups_of_thor_magni_are_found() -> None:
+def test_groups_of_thor_magni_are_found():
     file = real_data("magni") / "A.csv"
     pairs, true, found, right = confusion(
         szlib.read_tracks(file), sites.read_magni_groups(file)
@@ -261,9 +255,7 @@ def test_groups_of_thor_magni_are_found() -> None:
     assert (found, right) == (23, 23), "the one missed is of three who walk in a line"
 
 
-def test_the_kinds_of_the_real_day(
-    real_tracks: pd.DataFrame, real_samples: pd.DataFrame
-) -> None:
+def test_the_kinds_of_the_real_day(real_tracks, real_samples):
     kinds = real_samples.groupby("encounter")["kind"].first().value_counts()
     assert kinds.sum() == 252
     assert 170 <= kinds["companions"] + kinds["same direction"] <= 190
@@ -275,7 +267,7 @@ def test_the_kinds_of_the_real_day(
     )
 
 
-def test_few_shifted_pairs_are_companions(real_tracks: pd.DataFrame) -> None:
+def test_few_shifted_pairs_are_companions(real_tracks):
     rng = np.random.default_rng(0)
     people, of = np.unique(real_tracks["id"], return_inverse=True)
     shift = rng.choice([-1, 1], len(people)) * rng.integers(600, 6000, len(people))
@@ -289,7 +281,7 @@ def test_few_shifted_pairs_are_companions(real_tracks: pd.DataFrame) -> None:
     assert (kinds["kind"] == COMPANIONS).mean() < 0.06
 
 
-def test_strangers_are_all_but_companions() -> None:
+def test_strangers_are_all_but_companions():
     samples = pd.DataFrame({"encounter": range(len(KINDS)), "kind": list(KINDS)})
     assert of_kind(samples, "strangers")["kind"].tolist() == [
         kind for kind in KINDS if kind != COMPANIONS

@@ -1,12 +1,9 @@
 """The example many_days.py: processes here, a real SSH server, and a SLURM of two scripts."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -35,7 +32,7 @@ kill -- "-$1"
 
 
 @pytest.fixture(scope="module")
-def days(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def days(tmp_path_factory):
     folder = tmp_path_factory.mktemp("many_days")
     for seed, date in enumerate(("2012-10-24", "2012-10-28", "2012-10-31")):
         settings = szlib.PlazaSettings(n_encounters=40, date=date)
@@ -44,14 +41,14 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def samples(days: Path, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def samples(days, tmp_path_factory):
     """The encounters of these days, found without a cluster."""
     return szlib.extract_days(
         days, out=tmp_path_factory.mktemp("alone"), progress=False
     ).samples()
 
 
-def run(kind: str, size: str, days: Path, out: Path, **environment: str) -> str:
+def run(kind, size, days, out, **environment):
     """What the example prints."""
     done = subprocess.run(
         [sys.executable, str(EXAMPLE), kind, size, str(days), str(out)],
@@ -61,7 +58,7 @@ def run(kind: str, size: str, days: Path, out: Path, **environment: str) -> str:
     return done.stdout
 
 
-def check(printed: str, out: Path, samples: pd.DataFrame) -> None:
+def check(printed, out, samples):
     """The days were extracted as without a cluster, and the zone was saved and judged."""
     assert "3 done" in printed and "undecided: " in printed.splitlines()[-1]
     found = szlib.Extraction.load(out / "days").samples()
@@ -72,16 +69,14 @@ def check(printed: str, out: Path, samples: pd.DataFrame) -> None:
     )
 
 
-def test_on_this_machine(days: Path, samples: pd.DataFrame, tmp_path: Path) -> None:
+def test_on_this_machine(days, samples, tmp_path):
     check(run("local", "2", days, tmp_path / "out"), tmp_path / "out", samples)
 
 
 @pytest.mark.skipif(
     shutil.which("setsid") is None, reason="the scripts in place of SLURM need setsid"
 )
-def test_on_slurm_each_job_is_a_process_and_is_cancelled(
-    days: Path, samples: pd.DataFrame, tmp_path: Path
-) -> None:
+def test_on_slurm_each_job_is_a_process_and_is_cancelled(days, samples, tmp_path):
     commands = tmp_path / "commands"
     commands.mkdir()
     for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
@@ -108,7 +103,7 @@ def test_on_slurm_each_job_is_a_process_and_is_cancelled(
 
 
 @pytest.fixture
-def home(tmp_path: Path) -> Iterator[Path]:
+def home(tmp_path):
     """A home whose SSH configuration leads to a server on this machine."""
     server = [
         sys.executable,
@@ -121,7 +116,7 @@ def home(tmp_path: Path) -> Iterator[Path]:
         running.terminate()
 
 
-def test_on_machines_with_ssh(days: Path, samples: pd.DataFrame, home: Path) -> None:
+def test_on_machines_with_ssh(days, samples, home):
     check(
         run("ssh", "node1,node2", days, home / "out", HOME=str(home)),
         home / "out",
@@ -134,7 +129,7 @@ def test_on_machines_with_ssh(days: Path, samples: pd.DataFrame, home: Path) -> 
     )
 
 
-def test_what_is_no_cluster_is_refused(days: Path, tmp_path: Path) -> None:
+def test_what_is_no_cluster_is_refused(days, tmp_path):
     done = subprocess.run(
         [sys.executable, str(EXAMPLE), "cloud", "2", str(days), str(tmp_path / "out")],
         capture_output=True, text=True, env=os.environ | HERE,

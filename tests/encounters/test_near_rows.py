@@ -1,9 +1,5 @@
 """Rows near the area: they have exactly the encounters of the whole day."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -31,7 +27,7 @@ SETTINGS = [
 
 
 @pytest.fixture(scope="module")
-def raw_days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def raw_days(tmp_path_factory):
     folder = tmp_path_factory.mktemp("raw")
     days = (make_raw_day(seed, wild=seed % 2 == 0) for seed in range(4))
     return [
@@ -41,13 +37,13 @@ def raw_days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.mark.parametrize(("square", "duration", "max_gap"), SETTINGS)
 def test_encounters_of_selected_rows_equal_those_of_the_whole_day(
-    raw_days: list[Path], square: szlib.Area, duration: float, max_gap: float | None
-) -> None:
+    raw_days, square, duration, max_gap
+):
     options = {"square": square, "duration": duration, "max_gap": max_gap}
     assert sum(assert_selected_as_whole(day, **options) for day in raw_days) > 0
 
 
-def test_few_rows_are_selected_and_the_others_counted(tmp_path: Path) -> None:
+def test_few_rows_are_selected_and_the_others_counted(tmp_path):
     path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=30))
     assert assert_selected_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
     whole, corner = read_raw(path), szlib.Square(x=(-18.5, -17), y=(-10, -9))
@@ -57,20 +53,18 @@ def test_few_rows_are_selected_and_the_others_counted(tmp_path: Path) -> None:
     assert funnels.get(near)[-1]["rejected"] == rejected
 
 
-def test_where_nobody_comes_near_all_rows_are_kept(tmp_path: Path) -> None:
+def test_where_nobody_comes_near_all_rows_are_kept(tmp_path):
     path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=30))
     elsewhere = read_near(path, szlib.Square(x=(500, 520), y=(500, 520)))
     pd.testing.assert_frame_equal(elsewhere, read_raw(path))
 
 
-def select(
-    rows: pl.DataFrame, duration: float = 3.0, max_gap: float | None = 0.5
-) -> pl.DataFrame:
+def select(rows, duration=3.0, max_gap=0.5):
     settings = szlib.EncounterSettings(area=szlib.ATC_SQUARE, duration=duration)
     return select_near(settings, rows, None, max_gap)
 
 
-def test_people_and_days_are_kept_apart() -> None:
+def test_people_and_days_are_kept_apart():
     """Somebody far away is not selected for the rows of another person, or of another day."""
     here = pl.DataFrame({"t": np.arange(0, 20, 0.1)})
     walks = [
@@ -90,9 +84,7 @@ def test_people_and_days_are_kept_apart() -> None:
 
 @pytest.mark.parametrize("duration", [0.2, 1.0, 3.0, 10.0])
 @pytest.mark.parametrize("max_gap", [0.2, 0.5, 3.0])
-def test_rows_half_a_second_before_and_a_window_after_are_selected(
-    duration: float, max_gap: float
-) -> None:
+def test_rows_half_a_second_before_and_a_window_after_are_selected(duration, max_gap):
     """And one gap farther both ways, to interpolate; but few more.
 
     A person crosses the area within a gap, wherever this falls in the cells: no row is inside.

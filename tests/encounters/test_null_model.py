@@ -1,7 +1,5 @@
 """The null model: the encounters of time-shifted days equal those of a search of each whole day."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -19,18 +17,16 @@ ASKED = {"minutes": (1.0, 5.0), "min_distance": 0.5}
 
 
 @pytest.fixture(scope="module")
-def tracks() -> pd.DataFrame:
+def tracks():
     return noninteracting_crowd(seed=5, people=500, minutes=15)
 
 
 @pytest.fixture(scope="module")
-def null(tracks: pd.DataFrame) -> szlib.NullEncounters:
+def null(tracks):
     return szlib.null_encounters(tracks, shifts=7, seed=4, progress=False, **ASKED)
 
 
-def test_each_shift_equals_encounters_of_the_shifted_day(
-    tracks: pd.DataFrame, null: szlib.NullEncounters
-) -> None:
+def test_each_shift_equals_encounters_of_the_shifted_day(tracks, null):
     for shift in (0, 3, 6):
         day = szlib.time_shifted(tracks, seed=(4, shift), minutes=ASKED["minutes"])
         whole = szlib.find_encounters(day, min_distance=0.5)
@@ -54,8 +50,8 @@ def test_each_shift_equals_encounters_of_the_shifted_day(
 
 
 def test_encounter_numbers_are_unique_and_the_funnel_adds_up(
-    null: szlib.NullEncounters,
-) -> None:
+    null,
+):
     assert null.encounters["encounter"].is_unique
     assert (null.samples.groupby("encounter")["shift"].nunique() == 1).all()
     assert set(null.samples["encounter"]) <= set(null.encounters["encounter"])
@@ -67,16 +63,14 @@ def test_encounter_numbers_are_unique_and_the_funnel_adds_up(
     json.dumps(null.parameters)
 
 
-def test_first_shifts_do_not_depend_on_their_number(
-    tracks: pd.DataFrame, null: szlib.NullEncounters
-) -> None:
+def test_first_shifts_do_not_depend_on_their_number(tracks, null):
     fewer = szlib.null_encounters(tracks, shifts=2, seed=4, progress=False, **ASKED)
     pd.testing.assert_frame_equal(
         fewer.encounters, null.encounters[null.encounters["shift"] < 2]
     )
 
 
-def test_kinds_are_selected_as_in_the_data(null: szlib.NullEncounters) -> None:
+def test_kinds_are_selected_as_in_the_data(null):
     some = null.of_kind(["opposite", "crossing"])
     assert (
         set(some.encounters["kind"])
@@ -92,7 +86,7 @@ def test_kinds_are_selected_as_in_the_data(null: szlib.NullEncounters) -> None:
         null.of_kind("friends")
 
 
-def test_null_model_without_encounters_is_empty() -> None:
+def test_null_model_without_encounters_is_empty():
     tracks = make_tracks(
         make_walk((-12, 0), (1, 0)), make_walk((-12, 0), (1, 0), person=2, begin=1800)
     )
@@ -103,16 +97,14 @@ def test_null_model_without_encounters_is_empty() -> None:
     assert null.shifts == 3
 
 
-def test_invalid_arguments_raise(
-    tracks: pd.DataFrame, null: szlib.NullEncounters
-) -> None:
+def test_invalid_arguments_raise(tracks, null):
     with pytest.raises(DataError, match="shifts must be at least 1"):
         szlib.null_encounters(tracks, shifts=0)
     with pytest.raises(DataError, match=r"unknown parameter \['min_distanse'"):
         szlib.null_encounters(tracks, shifts=1, progress=False, min_distanse=1.0)
 
 
-def test_the_real_day(real_tracks: pd.DataFrame) -> None:
+def test_the_real_day(real_tracks):
     null = szlib.null_encounters(real_tracks, shifts=1, seed=2, progress=False)
     whole = szlib.find_encounters(szlib.time_shifted(real_tracks, seed=(2, 0)))
     np.testing.assert_array_equal(
@@ -123,7 +115,7 @@ def test_the_real_day(real_tracks: pd.DataFrame) -> None:
     )
 
 
-def test_groups_do_not_look_like_respect() -> None:
+def test_groups_do_not_look_like_respect():
     """Lone encounters of people of whom 70 % walk in groups abreast, and nobody reacts to anybody."""
     found = []
     for seed in range(2):

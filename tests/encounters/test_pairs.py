@@ -1,7 +1,5 @@
 """Every pair once, groups and streams moved as one, and what the ends of tracks say about the sensor."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,31 +14,29 @@ PLACE = "-15 15 -15 15"
 
 
 def crowd(
-    kind: str,
+    kind,
     *,
-    seed: int = 0,
-    people: int = 300,
-    seconds: float = 900,
-    tracker: str = "",
-) -> pd.DataFrame:
+    seed=0,
+    people=300,
+    seconds=900,
+    tracker="",
+):
     rng = np.random.default_rng(seed)
     rows = crowds.as_table(crowds.CROWDS[kind](rng, people, seconds))
     return crowds.read(crowds.TRACKERS[tracker](rows, rng) if tracker else rows, rng)
 
 
 @pytest.fixture(scope="module")
-def tracks() -> pd.DataFrame:
+def tracks():
     return crowd("groups")
 
 
-def nearest_by_loop(
-    tracks: pd.DataFrame, r_max: float = 2.0
-) -> dict[tuple[int, int], float]:
+def nearest_by_loop(tracks, r_max=2.0):
     """Nearest approach of all pairs in the area, by a search of each moment."""
     inside = tracks[
         crowds.AREA.contains(tracks["x"].to_numpy(), tracks["y"].to_numpy())
     ]
-    found: dict[tuple[int, int], float] = {}
+    found = {}
     for _, now in inside.groupby(inside["t"].round(1)):
         ids, place = now["id"].to_numpy(), now[["x", "y"]].to_numpy()
         apart = np.hypot(*(place[:, None] - place).T)
@@ -50,7 +46,7 @@ def nearest_by_loop(
     return found
 
 
-def test_pairs_are_those_of_a_search_of_each_moment(tracks: pd.DataFrame) -> None:
+def test_pairs_are_those_of_a_search_of_each_moment(tracks):
     pairs = szlib.find_pairs(tracks, area=crowds.AREA, kinds=None)
     nearest = pairs.groupby(["ref_id", "other_id"])["distance"].min().to_dict()
     expected = nearest_by_loop(tracks)
@@ -69,7 +65,7 @@ def test_pairs_are_those_of_a_search_of_each_moment(tracks: pd.DataFrame) -> Non
     )
 
 
-def test_samples_are_what_both_people_see() -> None:
+def test_samples_are_what_both_people_see():
     left, right = (
         make_walk((-5, 0), (1, 0), person=1, duration=10),
         make_walk((5, 0.8), (-1, 0), person=2, duration=10),
@@ -83,7 +79,7 @@ def test_samples_are_what_both_people_see() -> None:
     assert (pairs["third"] == 0).all()
 
 
-def test_third_people_are_counted_and_filter_nobody() -> None:
+def test_third_people_are_counted_and_filter_nobody():
     walks = [make_walk((-5, 0), (1, 0), person=1, duration=10)]
     walks += [
         make_walk((5, 0.8 + 0.6 * k), (-1, 0), person=2 + k, duration=10)
@@ -94,7 +90,7 @@ def test_third_people_are_counted_and_filter_nobody() -> None:
     assert (pairs["third"] == 1).all()
 
 
-def test_the_order_of_rows_and_the_frame_do_not_matter(tracks: pd.DataFrame) -> None:
+def test_the_order_of_rows_and_the_frame_do_not_matter(tracks):
     pairs = szlib.find_pairs(tracks, area=crowds.AREA)
     mixed = szlib.find_pairs(tracks.sample(frac=1, random_state=0), area=crowds.AREA)
     pd.testing.assert_frame_equal(
@@ -102,7 +98,7 @@ def test_the_order_of_rows_and_the_frame_do_not_matter(tracks: pd.DataFrame) -> 
     )
 
 
-def test_groups_are_units_and_never_separated(tracks: pd.DataFrame) -> None:
+def test_groups_are_units_and_never_separated(tracks):
     group = Crowd.from_tracks(tracks, crowds.AREA)
     sizes = np.bincount(np.bincount(group.unit[np.unique(group.rows.person)]))
     assert len(sizes) == 1 + 4, "no chain of strangers"
@@ -112,8 +108,8 @@ def test_groups_are_units_and_never_separated(tracks: pd.DataFrame) -> None:
 
 
 def test_a_null_holds_the_kinds_compared_and_depends_on_its_seed(
-    tracks: pd.DataFrame,
-) -> None:
+    tracks,
+):
     null, again, other = (
         szlib.null_pairs(tracks, area=crowds.AREA, shifts=3, seed=seed, progress=False)
         for seed in (1, 1, 2)
@@ -127,14 +123,14 @@ def test_a_null_holds_the_kinds_compared_and_depends_on_its_seed(
     np.testing.assert_allclose(by_sample, listed[by_sample.index])
 
 
-def test_a_null_has_as_many_pairs_as_a_crowd_that_ignores_each_other() -> None:
+def test_a_null_has_as_many_pairs_as_a_crowd_that_ignores_each_other():
     tracks = crowd("singles", people=600, seconds=1200)
     pairs = szlib.find_pairs(tracks, area=crowds.AREA)["encounter"].nunique()
     null = szlib.null_pairs(tracks, area=crowds.AREA, shifts=10, progress=False)
     assert len(null.encounters) / 10 == pytest.approx(pairs, rel=0.2)
 
 
-def test_a_merging_tracker_is_noticed_and_a_sound_one_is_not() -> None:
+def test_a_merging_tracker_is_noticed_and_a_sound_one_is_not():
     for tracker, loses in (("", False), ("broken", False), ("merging", True)):
         null = szlib.null_pairs(
             crowd("singles", people=600, seconds=1200, tracker=tracker),
@@ -148,7 +144,7 @@ def test_a_merging_tracker_is_noticed_and_a_sound_one_is_not() -> None:
     assert null.sensor.ends_low > 10 * null.sensor.samples_near
 
 
-def test_what_has_no_meaning_is_refused(tracks: pd.DataFrame) -> None:
+def test_what_has_no_meaning_is_refused(tracks):
     with pytest.raises(DataError, match="r_max must be a positive distance"):
         szlib.find_pairs(tracks, area=crowds.AREA, r_max=0)
     with pytest.raises(DataError, match="shifts must be at least 1"):

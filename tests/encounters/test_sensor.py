@@ -1,44 +1,40 @@
 """The sensor: its noise, and the ids that it exchanges, are those with which a crowd was made."""
 
-from __future__ import annotations
-
 import numpy as np
-import pandas as pd
 import pytest
 from benchmarks.truth import crowds
 
 from szlib.encounters.pairs import Crowd
-from szlib.encounters.sensor import SensorCheck
 from szlib.workbook.cli import describe_pairs
 
 
-def crowd_of(seed: int, tracker: str = "", **sensor: float) -> pd.DataFrame:
+def crowd_of(seed, tracker="", **sensor):
     rng = np.random.default_rng(seed)
     rows = crowds.as_table(crowds.singles(rng, 400, 600))
     seen = crowds.TRACKERS[tracker](rows, rng) if tracker else rows
     return crowds.read(seen, rng, **sensor)
 
 
-def check(tracks: pd.DataFrame) -> SensorCheck:
+def check(tracks):
     return Crowd.from_tracks(tracks, crowds.AREA).sensor
 
 
 @pytest.mark.parametrize("rate", [10.0, 2.5])
 @pytest.mark.parametrize("noise", [0.01, 0.1])
-def test_noise_is_found_at_the_rate_of_the_sensor(rate: float, noise: float) -> None:
+def test_noise_is_found_at_the_rate_of_the_sensor(rate, noise):
     found = check(crowd_of(0, rate=rate, noise=noise))
     assert found.noise == pytest.approx(noise, rel=0.05)
     assert found.noise_low < found.noise < found.noise_high
     assert found.noise_high - found.noise_low < 0.1 * noise
 
 
-def test_straight_paths_without_noise_have_none() -> None:
+def test_straight_paths_without_noise_have_none():
     found = check(crowd_of(0))
     assert found.noise == found.noise_high == 0
     assert "no error of positions was found" in str(found)
 
 
-def test_exchanged_ids_are_seen_and_passes_alone_are_not() -> None:
+def test_exchanged_ids_are_seen_and_passes_alone_are_not():
     sound, exchanged = check(crowd_of(1)), check(crowd_of(1, "id switches"))
     assert sound.passes > 30 and sound.exchanged == 0
     # Half of the pairs within 0.5 m are exchanged. Passes are counted up to 0.6 m, and two people who walk in
@@ -49,7 +45,7 @@ def test_exchanged_ids_are_seen_and_passes_alone_are_not() -> None:
     )
 
 
-def test_the_description_says_how_many_pairs_and_what_is_lost() -> None:
+def test_the_description_says_how_many_pairs_and_what_is_lost():
     sound = describe_pairs(crowd_of(2), crowds.AREA).splitlines()
     assert sound[0].startswith(
         "pairs who come towards each other or cross, within 2 m: "

@@ -1,7 +1,5 @@
 """People moved in time: paths and density stay, companions stay together, the recorded hours stay."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,21 +14,21 @@ MINUTES = (1.0, 5.0)
 
 
 @pytest.fixture(scope="module")
-def tracks() -> pd.DataFrame:
+def tracks():
     """300 people in 20 minutes, some of them cut off by the end of the recording."""
     return noninteracting_crowd(seed=3, people=300, minutes=20)
 
 
 @pytest.fixture(scope="module")
-def shifted(tracks: pd.DataFrame) -> pd.DataFrame:
+def shifted(tracks):
     return szlib.time_shifted(tracks, seed=1, minutes=MINUTES)
 
 
-def ticks(tracks: pd.DataFrame) -> np.ndarray:
+def ticks(tracks):
     return nearest_tick(tracks["t"].to_numpy())
 
 
-def all_day(day: str = DAY, person: int = 999, minutes: float = 20) -> pd.DataFrame:
+def all_day(day=DAY, person=999, minutes=20):
     """Somebody who is seen from the first to the last tick, and ends far from where they began."""
     return make_walk(
         (-18, -8), (0.01, 0.0), person=person, day=day, duration=60 * minutes
@@ -40,16 +38,14 @@ def all_day(day: str = DAY, person: int = 999, minutes: float = 20) -> pd.DataFr
 # --- what stays --------------------------------------------------------------------------------------
 
 
-def test_shifted_tracks_stay_within_the_recorded_hours(
-    tracks: pd.DataFrame, shifted: pd.DataFrame
-) -> None:
+def test_shifted_tracks_stay_within_the_recorded_hours(tracks, shifted):
     check_tracks(shifted)
     circle = np.floor(tracks["t"].min()), np.floor(tracks["t"].max()) + 2
     assert shifted["t"].between(*circle, inclusive="left").all()
     assert list(shifted.columns) == list(tracks.columns)
 
 
-def test_paths_stay(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
+def test_paths_stay(tracks, shifted):
     before, after = (
         {k: sorted(zip(p["x"], p["y"], strict=True)) for k, p in each.groupby("id")}
         for each in (tracks, shifted)
@@ -57,7 +53,7 @@ def test_paths_stay(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
     assert before == after
 
 
-def test_each_person_has_one_shift(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
+def test_each_person_has_one_shift(tracks, shifted):
     both = tracks.merge(shifted, on=["id", "x", "y"])
     second = np.floor(tracks["t"])
     period = 10 * int(second.max() - second.min() + 2)
@@ -69,9 +65,7 @@ def test_each_person_has_one_shift(tracks: pd.DataFrame, shifted: pd.DataFrame) 
     assert moved["min"].nunique() > 150, "each their own"
 
 
-def test_velocities_stay_except_near_the_seam(
-    tracks: pd.DataFrame, shifted: pd.DataFrame
-) -> None:
+def test_velocities_stay_except_near_the_seam(tracks, shifted):
     both = tracks.merge(shifted, on=["id", "x", "y"])
     same = np.isclose(both["vx_x"], both["vx_y"]) & np.isclose(
         both["vy_x"], both["vy_y"]
@@ -80,7 +74,7 @@ def test_velocities_stay_except_near_the_seam(
     assert same[~both["id"].isin(across.index[across])].all()
 
 
-def test_density_at_the_ends_of_the_recording_stays() -> None:
+def test_density_at_the_ends_of_the_recording_stays():
     """Reflected shifts would leave the first and the last minutes half empty."""
     tracks = noninteracting_crowd(seed=0, people=2000, minutes=20)
     minute = ticks(tracks) // 600
@@ -95,7 +89,7 @@ def test_density_at_the_ends_of_the_recording_stays() -> None:
     assert after / 4 == pytest.approx(np.full(19, before.mean()), rel=0.15)
 
 
-def test_gaps_and_the_seam_are_not_bridged() -> None:
+def test_gaps_and_the_seam_are_not_bridged():
     person = all_day()
     with_gap = person.drop(index=range(3000, 3010))
     tracks = make_tracks(with_gap, make_walk((-12, 0), (1, 0)))
@@ -110,7 +104,7 @@ def test_gaps_and_the_seam_are_not_bridged() -> None:
         assert (own["t"].diff().round(3) > 0.1).sum() == 2, "the gap, and the seam"
 
 
-def test_each_day_is_shifted_within_itself() -> None:
+def test_each_day_is_shifted_within_itself():
     days = ["2012-10-24", "2012-10-28"]
     walks = [
         make_walk((-12, 0), (1, 0), day=d, person=p, begin=b)
@@ -126,9 +120,7 @@ def test_each_day_is_shifted_within_itself() -> None:
         assert after.between(np.floor(before.min()), before.max() + 2).all()
 
 
-def test_result_depends_on_the_seed_and_not_on_row_order(
-    tracks: pd.DataFrame, shifted: pd.DataFrame
-) -> None:
+def test_result_depends_on_the_seed_and_not_on_row_order(tracks, shifted):
     untouched = tracks.copy()
     mixed = tracks.sample(frac=1, random_state=0)
     pd.testing.assert_frame_equal(
@@ -143,8 +135,8 @@ def test_result_depends_on_the_seed_and_not_on_row_order(
 # --- what is lost ------------------------------------------------------------------------------------
 
 
-def test_encounters_of_the_data_do_not_recur(tracks: pd.DataFrame) -> None:
-    def met(samples: pd.DataFrame) -> set[tuple[int, int]]:
+def test_encounters_of_the_data_do_not_recur(tracks):
+    def met(samples):
         return set(zip(samples["ref_id"], samples["other_id"], strict=True))
 
     found = met(szlib.find_encounters(tracks, square=szlib.ATC_SQUARE))
@@ -164,7 +156,7 @@ def test_encounters_of_the_data_do_not_recur(tracks: pd.DataFrame) -> None:
     assert sum(again) <= 1
 
 
-def test_companions_stay_together_and_passing_people_do_not() -> None:
+def test_companions_stay_together_and_passing_people_do_not():
     walks = [
         make_walk(
             (-18, -4 + 0.7 * k), (1, 0), person=10 * g + k, begin=40 * g, duration=10
@@ -190,7 +182,7 @@ def test_companions_stay_together_and_passing_people_do_not() -> None:
 # --- errors ------------------------------------------------------------------------------------------
 
 
-def test_too_short_a_recording_is_named(tracks: pd.DataFrame) -> None:
+def test_too_short_a_recording_is_named(tracks):
     for lasts in (20, 6, 2):
         check_tracks(
             szlib.time_shifted(tracks[tracks["t"] < tracks["t"].min() + 60 * lasts])
@@ -205,8 +197,8 @@ def test_too_short_a_recording_is_named(tracks: pd.DataFrame) -> None:
 
 @pytest.mark.parametrize("lasts", [2.0, 6.0, 10.9, 11.1, 15.0])
 def test_shifts_are_in_proportion_in_recordings_shorter_than_eleven_minutes(
-    lasts: float,
-) -> None:
+    lasts,
+):
     """A long day beside a short one keeps its shifts, those of the default range."""
     long, short = (
         noninteracting_crowd(seed=k, people=200, minutes=20).assign(day=name)
@@ -226,7 +218,7 @@ def test_shifts_are_in_proportion_in_recordings_shorter_than_eleven_minutes(
         assert minutes.max() <= 10 * share + 0.02
 
 
-def test_null_model_of_six_minutes_needs_no_minutes(tracks: pd.DataFrame) -> None:
+def test_null_model_of_six_minutes_needs_no_minutes(tracks):
     short = tracks[tracks["t"] < tracks["t"].min() + 360]
     null = szlib.null_encounters(short, shifts=2, progress=False)
     assert set(null.encounters["shift"]) == {0, 1}
@@ -235,14 +227,12 @@ def test_null_model_of_six_minutes_needs_no_minutes(tracks: pd.DataFrame) -> Non
 @pytest.mark.parametrize(
     "minutes", [(0, 5), (5, 1), (-5, -1), (1, np.inf), (np.nan, 5)]
 )
-def test_invalid_minutes_raise(
-    tracks: pd.DataFrame, minutes: tuple[float, float]
-) -> None:
+def test_invalid_minutes_raise(tracks, minutes):
     with pytest.raises(DataError, match="shortest, longest"):
         szlib.time_shifted(tracks, minutes=minutes)
 
 
-def test_the_real_day_keeps_its_hours(real_tracks: pd.DataFrame) -> None:
+def test_the_real_day_keeps_its_hours(real_tracks):
     moved = szlib.time_shifted(real_tracks)
     hours = [
         np.bincount((each["t"] // 3600 % 24).astype(int), minlength=24)

@@ -1,7 +1,5 @@
 """The admissible-control polygon, against `Step.verify`, which works every row out by formulas of its own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -11,7 +9,6 @@ import shapely
 from laboratory import find_admissible_controls, plot_admissible_controls
 
 import szlib
-from szlib.control import Step
 
 ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
 PASSAGE = szlib.SCENARIOS["making_room"].walls
@@ -34,9 +31,7 @@ MOMENTS = {
 }
 
 
-def step_at(
-    state: list[float], person: szlib.Person, walls: object, **settings: object
-) -> Step:
+def step_at(state, person, walls, **settings):
     controller = szlib.MPCCBF(
         ZONE,
         walls=walls,
@@ -45,7 +40,7 @@ def step_at(
     return controller.step(state, (6.0, 0.0), [person])
 
 
-def with_first(step: Step, a: np.ndarray) -> Step:
+def with_first(step, a):
     """The same plan, but for its first acceleration."""
     inputs = step.inputs.copy()
     inputs[0] = a
@@ -54,9 +49,7 @@ def with_first(step: Step, a: np.ndarray) -> Step:
 
 @pytest.mark.parametrize("n_h", [2, 8])
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(
-    moment: str, n_h: int
-) -> None:
+def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(moment, n_h):
     step = step_at(*MOMENTS[moment], N_h=n_h)
     polygon = find_admissible_controls(step).polygon
     edge, inside = polygon.boundary, 0
@@ -69,7 +62,7 @@ def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(
     assert 2 < inside < 118
 
 
-def test_the_polygon_lies_within_the_bounds_of_the_acceleration() -> None:
+def test_the_polygon_lies_within_the_bounds_of_the_acceleration():
     step = step_at(*MOMENTS["at full speed"])
     assert (
         shapely.box(-1, -1, 1, 1)
@@ -79,7 +72,7 @@ def test_the_polygon_lies_within_the_bounds_of_the_acceleration() -> None:
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_the_control_of_a_feasible_step_is_allowed(moment: str) -> None:
+def test_the_control_of_a_feasible_step_is_allowed(moment):
     step = step_at(*MOMENTS[moment])
     assert step.feasible
     assert (
@@ -88,7 +81,7 @@ def test_the_control_of_a_feasible_step_is_allowed(moment: str) -> None:
     )
 
 
-def test_a_robot_alone_at_rest_may_choose_every_acceleration() -> None:
+def test_a_robot_alone_at_rest_may_choose_every_acceleration():
     step = step_at([0.0, 0.0, 0.0, 0.0], szlib.Person((500.0, 0.0), heading=0.0), [])
     found = find_admissible_controls(step)
     assert found.limits == ()
@@ -96,7 +89,7 @@ def test_a_robot_alone_at_rest_may_choose_every_acceleration() -> None:
     assert find_admissible_controls(slow).polygon.area == pytest.approx(4.0)
 
 
-def test_each_limit_names_its_obstacle_and_has_the_allowed_side_on_its_left() -> None:
+def test_each_limit_names_its_obstacle_and_has_the_allowed_side_on_its_left():
     found = find_admissible_controls(step_at(*MOMENTS["backing out"]))
     step = step_at(*MOMENTS["backing out"])
     names = {step.scene.name(each.row).partition(" (")[0] for each in found.limits}
@@ -110,7 +103,7 @@ def test_each_limit_names_its_obstacle_and_has_the_allowed_side_on_its_left() ->
         assert along[0] * off[1] - along[1] * off[0] > 0
 
 
-def test_the_control_of_an_infeasible_plan_lies_outside_the_polygon() -> None:
+def test_the_control_of_an_infeasible_plan_lies_outside_the_polygon():
     step = step_at([0.0, 0.0, 1.0, 0.0], szlib.Person((1.6, 0.0), (-0.5, 0.0)), [])
     assert not step.feasible
     assert not find_admissible_controls(step).polygon.covers(
@@ -118,7 +111,7 @@ def test_the_control_of_an_infeasible_plan_lies_outside_the_polygon() -> None:
     )
 
 
-def test_a_decay_with_a_price_limits_the_polygon_as_a_hard_one() -> None:
+def test_a_decay_with_a_price_limits_the_polygon_as_a_hard_one():
     state, person, walls = MOMENTS["at full speed"]
     changes = {"N_h": 8, "gamma": 0.2}
     priced = step_at(state, person, walls, decay_price=100.0, **changes)
@@ -132,7 +125,7 @@ def test_a_decay_with_a_price_limits_the_polygon_as_a_hard_one() -> None:
     assert inside > 2
 
 
-def test_limits_are_rows_of_the_step_among_many_walls() -> None:
+def test_limits_are_rows_of_the_step_among_many_walls():
     """Obstacles that were left out of the problem are counted: `row` is a place in `Step.obstacles`."""
     far = [[(x, 30.0), (x + 0.5, 30.0)] for x in range(30)]
     walls = np.array([*far, [(-6.0, 1.0), (6.0, 1.0)]])
@@ -141,7 +134,7 @@ def test_limits_are_rows_of_the_step_among_many_walls() -> None:
     assert step.obstacles[row].numbers == (-6.0, 1.0, 6.0, 1.0)
 
 
-def test_admissible_controls_name_the_person_and_the_walls_that_forbid_others() -> None:
+def test_admissible_controls_name_the_person_and_the_walls_that_forbid_others():
     step = step_at(*MOMENTS["backing out"])
     ax = plot_admissible_controls(step)
     assert ax.get_xlabel().endswith("[m/s²]") and ax.get_aspect() == 1

@@ -1,7 +1,5 @@
 """The atlas: what a robot did gets one name, and a cell changes what it says and nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -18,9 +16,7 @@ from szlib.simulation.metrics import (
 )
 
 
-def made(
-    x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: object
-) -> SimulationLog:
+def made(x, y=-1.6, *, held=False, **changes):
     """A run along x, beside a person who stands at the origin, made by hand."""
     n, s = len(x), szlib.MPCSettings()
     scene = replace(
@@ -67,25 +63,25 @@ RUNS = {
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_each_run_has_its_strategy(name: str) -> None:
+def test_each_run_has_its_strategy(name):
     assert classify_strategy(RUNS[name]) == name
 
 
-def test_every_strategy_has_a_run() -> None:
+def test_every_strategy_has_a_run():
     assert set(RUNS) == set(STRATEGIES)
 
 
-def test_the_worst_strategy_is_reported() -> None:
+def test_the_worst_strategy_is_reported():
     both = replace(RUNS["infeasible"], arrival=None)
     assert classify_strategy(both) == "infeasible"
     assert classify_strategy(replace(RUNS["backs out"], arrival=None)) == "deadlock"
 
 
-def test_standing_without_an_active_barrier_is_not_waiting() -> None:
+def test_standing_without_an_active_barrier_is_not_waiting():
     assert classify_strategy(made(STANDS, held=False)) == "goes ahead"
 
 
-def test_retreat_is_measured_from_the_farthest_point_by_then() -> None:
+def test_retreat_is_measured_from_the_farthest_point_by_then():
     assert compute_retreat(RUNS["backs out"]) == pytest.approx(0.9)
     assert compute_retreat(RUNS["goes ahead"]) == 0.0 < MIN_RETREAT
 
@@ -94,19 +90,19 @@ def test_retreat_is_measured_from_the_farthest_point_by_then() -> None:
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_cell_of_the_paper_is_the_scenario_of_the_paper(scene: str) -> None:
+def test_a_cell_of_the_paper_is_the_scenario_of_the_paper(scene):
     same, own = AtlasCell(scene, width=SCENES[scene]).scenario(), szlib.SCENARIOS[scene]
     assert np.array_equal(same.walls, own.walls)
     assert same.people == own.people
 
 
-def test_width_moves_the_walls_of_a_pathway_without_gaps() -> None:
+def test_width_moves_the_walls_of_a_pathway_without_gaps():
     walls = AtlasCell("waiting", width=3.0).scenario().walls
     assert np.array_equal(np.unique(np.abs(walls[:2, :, 1])), [1.5])
     assert np.array_equal(np.sort(np.abs(walls[2:, :, 1]), axis=1), [[1.5, 4.0]] * 2)
 
 
-def test_the_atlas_has_one_row_per_cell_in_order() -> None:
+def test_the_atlas_has_one_row_per_cell_in_order():
     cells = [
         AtlasCell("corridor", width=6.4, size=0.5),
         AtlasCell("corridor", width=1.0),
@@ -123,12 +119,12 @@ def test_the_atlas_has_one_row_per_cell_in_order() -> None:
 @pytest.mark.parametrize(
     "wrong", [{"scene": "hall"}, {"scene": "corridor", "width": 0}]
 )
-def test_invalid_cells_are_rejected(wrong: dict[str, object]) -> None:
+def test_invalid_cells_are_rejected(wrong):
     with pytest.raises(szlib.SolverError, match="must be"):
         AtlasCell(**wrong)  # type: ignore[arg-type]
 
 
-def test_the_controller_decides_again_at_each_time_of_a_run() -> None:
+def test_the_controller_decides_again_at_each_time_of_a_run():
     log = AtlasCell("corridor", size=0.5).run(REFERENCE)
     controller = szlib.MPCCBF(log.zones[0], walls=log.scenario.walls)
     for time in (0.0, 3.0):

@@ -1,7 +1,5 @@
 """The study of distance and time to collision: motion against a small simulation, and known ratios."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,7 +8,7 @@ from studies import collision
 RNG = np.random.default_rng(0)
 
 
-def make_samples(n: int) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
+def make_samples(n):
     """Samples of `n` pairs, and position and velocity of the second person relative to the first."""
     place, one, other = (RNG.normal(0, s, (n, 2)) @ [1, 1j] for s in (2.0, 1.0, 1.0))
     samples = pd.DataFrame(
@@ -26,7 +24,7 @@ def make_samples(n: int) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
     return samples, place, other - one
 
 
-def test_motion_is_that_of_two_people_who_walk_straight_on() -> None:
+def test_motion_is_that_of_two_people_who_walk_straight_on():
     samples, place, velocity = make_samples(200)
     motion = collision.describe_motion(samples)
     times = np.arange(0, 20, 1e-3)
@@ -43,7 +41,7 @@ def test_motion_is_that_of_two_people_who_walk_straight_on() -> None:
         )
 
 
-def test_half_is_where_the_ratio_rises_through_one_half() -> None:
+def test_half_is_where_the_ratio_rises_through_one_half():
     value = np.arange(0.05, 2, 0.1)
     expected, n = np.ones(len(value)), np.full(len(value), 50)
     assert collision.find_half(
@@ -54,7 +52,7 @@ def test_half_is_where_the_ratio_rises_through_one_half() -> None:
     assert np.isnan(collision.find_half(value, expected, expected, 0 * n))
 
 
-def test_a_circle_that_nobody_enters_is_found_at_the_nearest_approach() -> None:
+def test_a_circle_that_nobody_enters_is_found_at_the_nearest_approach():
     """Pairs who pass straight by each other at 0 to 5 m; those of the data at no less than `CIRCLE`."""
     n, t = 4000, np.arange(-3, 3.01, 0.2)
     miss, speed = RNG.uniform(-5, 5, n), RNG.uniform(1.2, 2.2, n)

@@ -165,7 +165,7 @@ def test_invalid_arguments_are_refused():
             Grid(origin, resolution, shape)
 
 
-def test_a_grid_may_have_one_row_or_one_cell() -> None:
+def test_a_grid_may_have_one_row_or_one_cell():
     for shape in ((1, 5), (5, 1), (1, 1)):
         grid = Grid(origin=(0.0, 0.0), resolution=0.1, shape=shape)
         assert grid.centers().shape == (*shape, 2)

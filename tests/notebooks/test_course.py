@@ -32,7 +32,7 @@ FOLDERS = tuple(
 TIME = re.compile(r"(\d+ h )?\d+\s(#\s)?min\b")
 
 
-def without_times(text: str) -> str:
+def without_times(text):
     """The text on one line without reading times, which may differ a little."""
     return " ".join(TIME.sub("T min", text).replace("\n#", " ").split())
 

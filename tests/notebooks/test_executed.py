@@ -1,7 +1,5 @@
 """Notebooks that a run executed have the figures of their committed copies: after `make run`, as CI does."""
 
-from pathlib import Path
-
 import nbformat
 import pytest
 
@@ -20,7 +18,7 @@ EXECUTED = [
 ]
 
 
-def count_images(notebook: Path) -> int:
+def count_images(notebook):
     cells = nbformat.read(notebook, as_version=4).cells
     outputs = [output for cell in cells for output in cell.get("outputs", ())]
     return sum("image/png" in output.get("data", {}) for output in outputs)
@@ -32,7 +30,5 @@ def count_images(notebook: Path) -> int:
 @pytest.mark.parametrize(
     ("executed", "committed"), EXECUTED, ids=lambda file: file.stem
 )
-def test_executed_notebook_has_as_many_figures_as_its_copy(
-    executed: Path, committed: Path
-) -> None:
+def test_executed_notebook_has_as_many_figures_as_its_copy(executed, committed):
     assert count_images(executed) == count_images(committed)

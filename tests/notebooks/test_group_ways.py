@@ -1,7 +1,5 @@
 """Ways between two people of a group: crossed, passed by, too wide, and too late."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from studies.group_ways import walks_between
@@ -10,7 +8,7 @@ from studies.replay import RecordedPerson
 TIMES = np.arange(0, 4, 0.1)
 
 
-def walk_along(y: float, *, first: int = 0) -> RecordedPerson:
+def walk_along(y, *, first=0):
     """Somebody who walks along x at 0.5 m/s, from tick `first` on, for 4 s."""
     x = 0.05 * np.arange(40)
     return RecordedPerson(
@@ -27,9 +25,7 @@ def walk_along(y: float, *, first: int = 0) -> RecordedPerson:
         pytest.param(1.5, 1.0, 30, False, id="one of them comes later"),
     ],
 )
-def test_between_two_people(
-    speed: float, gap: float, first: int, expected: bool
-) -> None:
+def test_between_two_people(speed, gap, first, expected):
     path = np.column_stack([speed * TIMES - 1, 0.1 + 0 * TIMES])
     one, other = walk_along(gap / 2), walk_along(-gap / 2, first=first)
     assert walks_between(TIMES, path, one, other) is expected

@@ -1,7 +1,5 @@
 """A zone imposed on a crowd: nobody stays within it but the careless, from wherever one looks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -21,23 +19,23 @@ MINUTES, SETTINGS = (
 
 
 @pytest.fixture(scope="module")
-def tracks() -> pd.DataFrame:
+def tracks():
     return noninteracting_crowd(seed=5, people=2500, minutes=40)
 
 
 @pytest.fixture(scope="module")
-def paired(tracks: pd.DataFrame) -> PairedSamples:
+def paired(tracks):
     shifted = szlib.time_shifted(tracks, seed=2, minutes=MINUTES)
     return PairedSamples.from_samples(szlib.find_encounters(shifted, settings=SETTINGS))
 
 
-def pairs_of(samples: pd.DataFrame) -> pd.Series:
+def pairs_of(samples):
     """The two people of each sample, the lower id first."""
     people = samples[["ref_id", "other_id"]]
     return people.min(axis=1) * 10_000 + people.max(axis=1)
 
 
-def entering(tracks: pd.DataFrame, samples: pd.DataFrame) -> set[int]:
+def entering(tracks, samples):
     """Pairs in which one person is inside the placed ellipse of the other, one ellipse a sample."""
     rows = match_rows(tracks, samples)
     inside = np.zeros(len(samples), bool)
@@ -53,8 +51,8 @@ def entering(tracks: pd.DataFrame, samples: pd.DataFrame) -> set[int]:
 
 
 def test_nobody_within_the_zone_remains_and_everybody_else_does(
-    tracks: pd.DataFrame,
-) -> None:
+    tracks,
+):
     shifted = szlib.time_shifted(tracks, seed=2, minutes=MINUTES)
     everybody = szlib.find_encounters(shifted, settings=SETTINGS, kinds="crossing")
     expected = entering(shifted, everybody)
@@ -71,7 +69,7 @@ def test_nobody_within_the_zone_remains_and_everybody_else_does(
     assert list(stage["rejected"]) == ["one person enters the other's zone"]
 
 
-def test_the_zone_of_the_other_person_counts_as_well(paired: PairedSamples) -> None:
+def test_the_zone_of_the_other_person_counts_as_well(paired):
     """A long zone ahead of the other person reaches people who have nobody in their own zone."""
     ahead = szlib.Ellipse((0.8, 0.0), (1.2, 0.4))
     nearest = ahead.level(paired.points).T
@@ -81,10 +79,10 @@ def test_the_zone_of_the_other_person_counts_as_well(paired: PairedSamples) -> N
     assert set(np.flatnonzero(paired.pairs_inside(ahead))) == {*own, *other}
 
 
-def test_careless_share_is_recovered_and_nested(paired: PairedSamples) -> None:
+def test_careless_share_is_recovered_and_nested(paired):
     inside = set(np.flatnonzero(paired.pairs_inside(ZONE)))
 
-    def careless_pairs(share: float, seed: int) -> set[int]:
+    def careless_pairs(share, seed):
         kept = paired.impose(ZONE, careless=share, seed=seed)
         return inside & set(paired.pair[np.isin(paired.samples.index, kept.index)])
 
@@ -98,7 +96,7 @@ def test_careless_share_is_recovered_and_nested(paired: PairedSamples) -> None:
     pd.testing.assert_frame_equal(paired.impose(ZONE, careless=1.0), paired.samples)
 
 
-def test_both_orders_of_a_pair_share_their_fate(paired: PairedSamples) -> None:
+def test_both_orders_of_a_pair_share_their_fate(paired):
     """Whoever is the reference, and in whichever window: the pair stays or goes as a whole."""
     people = pairs_of(paired.samples)
     both = people[people.map(paired.samples.groupby(people)["ref_id"].nunique()) == 2]
@@ -111,15 +109,13 @@ def test_both_orders_of_a_pair_share_their_fate(paired: PairedSamples) -> None:
         assert not set(people[kept]) & set(people[removed])
 
 
-def test_an_ellipse_of_no_size_removes_nothing(paired: PairedSamples) -> None:
+def test_an_ellipse_of_no_size_removes_nothing(paired):
     kept = paired.impose(szlib.Ellipse((0.0, 0.0), (1e-9, 1e-9)))
     pd.testing.assert_frame_equal(kept, paired.samples)
     assert funnels.get(kept)[-1]["rejected"] == {}
 
 
-def test_a_turned_and_moved_world_changes_nothing(
-    tracks: pd.DataFrame, paired: PairedSamples
-) -> None:
+def test_a_turned_and_moved_world_changes_nothing(tracks, paired):
     turned = tracks.assign(
         x=30 - tracks["y"], y=tracks["x"] - 7, vx=-tracks["vy"], vy=tracks["vx"]
     )
@@ -136,7 +132,7 @@ def test_a_turned_and_moved_world_changes_nothing(
     np.testing.assert_allclose(found["distance"], expected["distance"], atol=1e-9)
 
 
-def test_a_standing_person_has_no_zone_but_is_kept_out_of_others() -> None:
+def test_a_standing_person_has_no_zone_but_is_kept_out_of_others():
     """The walker passes at 0.5 m on the left: within the round zone, and outside of the narrow one."""
     walk = make_walk((-17, 0), (1.2, 0), duration=8)
     stand = make_walk((-14.5, 0.5), (0, 0.1), person=2, duration=8).assign(y=0.5)
@@ -149,14 +145,14 @@ def test_a_standing_person_has_no_zone_but_is_kept_out_of_others() -> None:
     assert len(paired.impose(szlib.Ellipse((0.0, 0.0), (0.8, 0.4)))) == len(samples)
 
 
-def test_without_encounters_the_result_is_empty(tracks: pd.DataFrame) -> None:
+def test_without_encounters_the_result_is_empty(tracks):
     far = szlib.EncounterSettings(area="100 120 100 120")
     imposed = impose_zone(tracks, ZONE, minutes=MINUTES, settings=far)
     assert len(imposed) == 0
     assert funnels.get(imposed)[-1]["entered"] == 0
 
 
-def test_invalid_arguments_raise(tracks: pd.DataFrame, paired: PairedSamples) -> None:
+def test_invalid_arguments_raise(tracks, paired):
     for share in (-0.1, 1.1, np.nan):
         with pytest.raises(
             szlib.DataError, match=r"careless must be a share of pairs, 0 to 1; got"

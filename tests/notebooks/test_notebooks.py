@@ -4,7 +4,6 @@
 """
 
 import re
-from pathlib import Path
 
 import jupytext
 import nbformat
@@ -21,15 +20,15 @@ MAX_CHECKS = 8
 CHAPTERS = [s for s in SOURCES if "01" <= s.stem[:2] <= "13"]
 
 
-def cells(source: Path) -> list[nbformat.NotebookNode]:
+def cells(source):
     return jupytext.read(source).cells
 
 
-def is_hidden(cell: nbformat.NotebookNode) -> bool:
+def is_hidden(cell):
     return bool(cell.metadata.get("jupyter", {}).get("source_hidden"))
 
 
-def code_lines(cell: nbformat.NotebookNode) -> int:
+def code_lines(cell):
     return sum(
         1
         for line in cell.source.splitlines()
@@ -43,7 +42,7 @@ RESULT = re.compile(
 )
 
 
-def read_results(source: Path) -> list[tuple[str, str, str]]:
+def read_results(source):
     """Kind, name and result of each check and claim that the executed copy of a notebook shows."""
     executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
     outputs = [out for cell in executed.cells for out in cell.get("outputs", ())]
@@ -192,7 +191,7 @@ def test_read_defaults_finds_what_the_cell_sets():
         (tagged,) = [
             c for c in cells(source) if "parameters" in c.metadata.get("tags", [])
         ]
-        variables: dict[str, object] = {}
+        variables = {}
         exec(tagged.source, variables)
         assert variables == read_defaults(source) | {
             "__builtins__": variables["__builtins__"]
@@ -200,7 +199,7 @@ def test_read_defaults_finds_what_the_cell_sets():
 
 
 def test_parameter_has_the_same_type_in_all_notebooks():
-    types: dict[str, set[type]] = {}
+    types = {}
     for source in SOURCES:
         for name, value in read_defaults(source).items():
             types.setdefault(name, set()).add(type(value))

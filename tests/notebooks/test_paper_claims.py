@@ -1,7 +1,5 @@
 """Claims: effects whose intervals mean what they say, and verdicts that follow from them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -14,11 +12,11 @@ from studies.sensitivity import sensitivity
 import szlib
 
 
-def finding(low: float, high: float) -> claims.Finding:
+def finding(low, high):
     return claims.Finding("people keep apart", (low + high) / 2, low, high, "m", 12)
 
 
-def test_the_verdict_follows_from_the_interval() -> None:
+def test_the_verdict_follows_from_the_interval():
     assert finding(0.1, 0.2).verdict == "supported"
     assert finding(-0.2, -0.1).verdict == "not supported"
     assert finding(-0.1, 0.2).verdict == "not decidable with n = 12"
@@ -30,7 +28,7 @@ def test_the_verdict_follows_from_the_interval() -> None:
     )
 
 
-def meetings(on_the_left: int, on_the_right: int) -> pd.DataFrame:
+def meetings(on_the_left, on_the_right):
     """Encounters of people who walk towards each other; the other is nearest on that side."""
     n = on_the_left + on_the_right
     side = np.repeat([1.0, -1.0], [on_the_left, on_the_right])
@@ -43,7 +41,7 @@ def meetings(on_the_left: int, on_the_right: int) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def test_a_person_to_the_left_is_passed_on_the_right() -> None:
+def test_a_person_to_the_left_is_passed_on_the_right():
     assert claims.measure_passing_side(meetings(60, 20)).verdict == "supported"
     assert claims.measure_passing_side(meetings(20, 60)).verdict == "not supported"
     even = claims.measure_passing_side(meetings(10, 10))
@@ -58,7 +56,7 @@ def test_a_person_to_the_left_is_passed_on_the_right() -> None:
     )
 
 
-def test_a_pair_counts_once() -> None:
+def test_a_pair_counts_once():
     once = meetings(30, 10)
     both = pd.concat([once, once.rename(columns={"ref_id": "other_id", "other_id": "ref_id"}).assign(
         encounter=once["encounter"] + 1000)])  # fmt: skip
@@ -72,8 +70,8 @@ def test_a_pair_counts_once() -> None:
     [(0.25, "supported"), (1.0, "not decidable"), (4.0, "not supported")],
 )
 def test_density_is_low_only_in_an_area_with_fewer_people_than_around_it(
-    share: float, verdict: str
-) -> None:
+    share, verdict
+):
     rng, n = np.random.default_rng(0), 20_000
     area = szlib.Square((2.0, 6.0), (2.0, 8.0))
     x, y = rng.uniform(0, 10, (2, n))
@@ -97,12 +95,12 @@ def test_density_is_low_only_in_an_area_with_fewer_people_than_around_it(
      (40_000, 92, "not supported")],
 )  # fmt: skip
 def test_the_papers_own_rate_is_supported_and_a_fifth_of_it_is_not(
-    count: int, days: float, verdict: str
-) -> None:
+    count, days, verdict
+):
     assert claims.measure_encounter_rate(count, days).verdict.startswith(verdict)
 
 
-def test_an_interval_of_a_rate_covers_it() -> None:
+def test_an_interval_of_a_rate_covers_it():
     rng, inside = np.random.default_rng(0), 0
     truth = claims.measure_encounter_rate(300, 2.0).effect
     for count in rng.poisson(300, 400):
@@ -111,7 +109,7 @@ def test_an_interval_of_a_rate_covers_it() -> None:
     assert 0.92 <= inside / 400 <= 0.99
 
 
-def test_wilsons_interval_contains_zero_for_equal_shares() -> None:
+def test_wilsons_interval_contains_zero_for_equal_shares():
     rng = np.random.default_rng(1)
     undecided = [
         claims.measure_intruders_removed(int(k), 80) for k in rng.binomial(80, 0.5, 400)
@@ -119,21 +117,21 @@ def test_wilsons_interval_contains_zero_for_equal_shares() -> None:
     assert 0.92 <= np.mean([f.low <= 0 <= f.high for f in undecided]) <= 0.98
 
 
-def test_what_lof_removes_may_be_people() -> None:
+def test_what_lof_removes_may_be_people():
     assert claims.measure_intruders_removed(60, 80).verdict == "supported"
     assert claims.measure_intruders_removed(20, 80).verdict == "not supported"
     assert claims.measure_intruders_removed(0, 0).verdict.startswith("not decidable")
 
 
-def zone_of(people: pd.DataFrame, **options: object) -> szlib.SocialZone:
+def zone_of(people, **options):
     return szlib.SocialZone.fit(
         people, method="quantile", speeds=(0.7, 1.1, 1.3), **options
     )
 
 
 def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(
-    plaza: pd.DataFrame,
-) -> None:
+    plaza,
+):
     zone = zone_of(plaza, n_resamples=60)
     ahead, growth = (
         claims.measure_reach_ahead(zone),
@@ -152,13 +150,13 @@ def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(
 
 
 @pytest.fixture(scope="module")
-def plaza(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def plaza(tmp_path_factory):
     """Encounters of the plaza, whose zone reaches farther ahead and grows with speed."""
     path = tmp_path_factory.mktemp("plaza") / "plaza.csv"
     return szlib.find_encounters(szlib.read_tracks(szlib.make_plaza(path, seed=3)))
 
 
-def test_the_reach_ahead_is_the_difference_of_both_reaches(plaza: pd.DataFrame) -> None:
+def test_the_reach_ahead_is_the_difference_of_both_reaches(plaza):
     zone = zone_of(plaza, n_resamples=20)
     outline = zone.ellipses[1.1].curve(2000)
     found, row = (
@@ -175,8 +173,8 @@ def test_the_reach_ahead_is_the_difference_of_both_reaches(plaza: pd.DataFrame) 
 
 
 def test_zones_that_reach_farther_behind_or_shrink_contradict_the_paper(
-    plaza: pd.DataFrame,
-) -> None:
+    plaza,
+):
     zone = zone_of(plaza.assign(los_angle=np.pi - plaza["los_angle"]), n_resamples=60)
     assert claims.measure_reach_ahead(zone).verdict == "not supported"
     assert (
@@ -185,7 +183,7 @@ def test_zones_that_reach_farther_behind_or_shrink_contradict_the_paper(
     )
 
 
-def test_zones_without_people_on_some_side_decide_nothing(plaza: pd.DataFrame) -> None:
+def test_zones_without_people_on_some_side_decide_nothing(plaza):
     ahead = plaza[np.cos(plaza["los_angle"]) > 0.2]
     with pytest.warns(szlib.DataWarning):
         zone = zone_of(ahead, n_resamples=20)
@@ -197,7 +195,7 @@ def test_zones_without_people_on_some_side_decide_nothing(plaza: pd.DataFrame) -
         assert found.verdict.startswith("not decidable")
 
 
-def test_a_shape_is_a_difference_from_the_null_model() -> None:
+def test_a_shape_is_a_difference_from_the_null_model():
     crowd, null = passing_pairs(1000, 1), null_of(passing_pairs(2000, 0))
     people = respecting(crowd, szlib.Ellipse((0.0, 0.0), (0.9, 0.7)), careless=0.05)
     ahead, growth = claims.measure_shape(people, null)
@@ -218,7 +216,7 @@ def test_a_shape_is_a_difference_from_the_null_model() -> None:
     assert grown.verdict == "supported" and grown.effect > 0.2
 
 
-def test_a_shape_that_cannot_be_given_has_a_reason() -> None:
+def test_a_shape_that_cannot_be_given_has_a_reason():
     crowd, null = passing_pairs(400, 1), null_of(passing_pairs(1000, 0))
     few = crowd[crowd["encounter"].isin(crowd["encounter"].unique()[:100])]
     for people, model, reason in (
@@ -249,14 +247,14 @@ def test_a_shape_that_cannot_be_given_has_a_reason() -> None:
 
 
 def test_delays_have_their_range_over_scenarios(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     zone, times = (
         szlib.Ellipse((0.0, 0.0), (1.0, 0.7)),
         {"passing": 3.0, "corridor": 5.0, "waiting": 1.0},
     )
 
-    def run_scenario(name: str, zone: szlib.Ellipse) -> dict[str, float]:
+    def run_scenario(name, zone):
         return {"time_to_goal": 10 + times[name] * zone.semi_axes[0]}
 
     monkeypatch.setattr(claims, "run_scenario", run_scenario)
@@ -278,14 +276,14 @@ def test_delays_have_their_range_over_scenarios(
     assert earlier.verdict == "not supported"
 
 
-def test_a_larger_zone_makes_the_robot_later() -> None:
+def test_a_larger_zone_makes_the_robot_later():
     zone = szlib.Ellipse((0.05, 0.0), (0.9, 0.7))
     found = claims.measure_delay_by_size(zone, names=("passing", "corridor"))
     assert found.low > 0 and found.n == 2
     assert zone.scaled(2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
 
 
-def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:
+def test_sensitivity_varies_one_parameter_at_a_time(tmp_path):
     settings = szlib.PlazaSettings(n_encounters=250)
     tracks = szlib.read_tracks(
         szlib.make_plaza(tmp_path / "plaza.csv", seed=0, settings=settings)
@@ -309,7 +307,7 @@ def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:
     )
 
 
-def test_without_a_zone_a_claim_is_not_decidable() -> None:
+def test_without_a_zone_a_claim_is_not_decidable():
     rng = np.random.default_rng(0)
     fast = pd.DataFrame(
         {
@@ -331,7 +329,7 @@ TILTED = szlib.Ellipse((0.03, 0.0), (0.96, 0.75), 0.02)
 
 
 @pytest.fixture(scope="module")
-def chains() -> pd.DataFrame:
+def chains():
     letter = szlib.MPCSettings.paper()
     ours = szlib.MPCSettings(time_limit=np.inf)
     names, larger = ("passing", "waiting"), TILTED.scaled(1.2)
@@ -339,7 +337,7 @@ def chains() -> pd.DataFrame:
     return table.set_index(["scenario", "chain"])
 
 
-def test_each_difference_is_switched_on_alone(chains: pd.DataFrame) -> None:
+def test_each_difference_is_switched_on_alone(chains):
     assert list(chains.loc["passing"].index) == [
         "paper",
         "solver",
@@ -360,7 +358,7 @@ def test_each_difference_is_switched_on_alone(chains: pd.DataFrame) -> None:
     assert waiting.loc["margin", "min_h"] != waiting.loc["solver", "min_h"]
 
 
-def test_the_side_is_due_to_the_rule_and_not_to_the_paper(chains: pd.DataFrame) -> None:
+def test_the_side_is_due_to_the_rule_and_not_to_the_paper(chains):
     sides = chains.loc["passing", "passing_side"]
     assert sides[["side rule", "ours"]].tolist() == ["right", "right"]
     mirrored = szlib.Ellipse((0.03, 0.0), (0.96, 0.75), -0.02)
@@ -377,9 +375,7 @@ def test_the_side_is_due_to_the_rule_and_not_to_the_paper(chains: pd.DataFrame) 
      ({"min_speed": 0.44}, True), ({"passing_side": "left"}, True), ({"claims_held": 1}, True),
      ({"time_to_goal": np.nan}, True)],
 )  # fmt: skip
-def test_a_run_differs_in_a_number_a_side_or_a_claim(
-    change: dict[str, object], differs: bool
-) -> None:
+def test_a_run_differs_in_a_number_a_side_or_a_claim(change, differs):
     row = {
         "time_to_goal": 10.0,
         "min_h": 0.1,
@@ -392,7 +388,7 @@ def test_a_run_differs_in_a_number_a_side_or_a_claim(
     assert not chains_study.differs(stuck, stuck)
 
 
-def test_the_interval_of_a_rate_is_exact() -> None:
+def test_the_interval_of_a_rate_is_exact():
     """Of 10 encounters seen, the mean is 4.795 to 18.39 (Garwood, Biometrika 28, 1936)."""
     days = 10 / claims.PAPER_RATE * 8  # an eighth of the paper's rate
     found = claims.measure_encounter_rate(10, days)
@@ -404,7 +400,7 @@ def test_the_interval_of_a_rate_is_exact() -> None:
     assert claims.measure_encounter_rate(round(claims.PAPER_RATE), 1.0).high == 1.0
 
 
-def test_runs_differ_in_their_side_their_claims_or_a_number() -> None:
+def test_runs_differ_in_their_side_their_claims_or_a_number():
     row = dict.fromkeys(chains_study.RESOLUTION, 1.0) | {
         "passing_side": "left",
         "claims_held": 2,

@@ -1,7 +1,5 @@
 """The matrix of claims by condition: zones of people drawn anew, and what robots do with them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,7 +18,7 @@ ZONES, MATRIX = read_table("28_zones"), read_table("28_matrix")
 
 
 @pytest.fixture(scope="module")
-def samples() -> pd.DataFrame:
+def samples():
     """Samples of forty pairs; of each the other one is seen at the same distance."""
     rng, rows = np.random.default_rng(0), 40 * 31
     pair = np.arange(rows) // 31

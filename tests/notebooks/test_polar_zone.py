@@ -1,7 +1,5 @@
 """Polar zones: the fit finds a known ellipse, gaps have messages, invalid radii are refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from studies.quantile_zone import (
@@ -24,7 +22,7 @@ KNOWN = np.array(
 )
 
 
-def same(found: np.ndarray, expected: np.ndarray, metres: float) -> None:
+def same(found, expected, metres):
     """Centre and axes, and the angle where the axes tell it."""
     np.testing.assert_allclose(found[..., :4], expected[..., :4], rtol=0, atol=metres)
     turn = (found[..., 4] - expected[..., 4] + np.pi / 2) % np.pi - np.pi / 2
@@ -32,7 +30,7 @@ def same(found: np.ndarray, expected: np.ndarray, metres: float) -> None:
     np.testing.assert_allclose(turn[long], 0, atol=10 * metres)
 
 
-def test_the_slope_of_the_reach_is_that_of_small_changes() -> None:
+def test_the_slope_of_the_reach_is_that_of_small_changes():
     parameters = np.array([[0.1, -0.2, 1.3, 0.2, 1.1], [0.0, 0.05, 0.9, -0.1, 1.6]])
     unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
     slope = _parametric_reach(parameters, unit)[1]
@@ -45,11 +43,11 @@ def test_the_slope_of_the_reach_is_that_of_small_changes() -> None:
         )
 
 
-def test_fit_recovers_an_ellipse_from_its_radii() -> None:
+def test_fit_recovers_an_ellipse_from_its_radii():
     same(fit_ellipses(ellipse_reach(KNOWN)), KNOWN, 1e-8)
 
 
-def test_no_ellipse_is_nearer_to_noisy_radii() -> None:
+def test_no_ellipse_is_nearer_to_noisy_radii():
     rng = np.random.default_rng(0)
     radii = ellipse_reach(KNOWN[:1]) + rng.normal(0, 0.05, (1, len(DIRECTIONS)))
     found = fit_ellipses(radii)
@@ -61,8 +59,8 @@ def test_no_ellipse_is_nearer_to_noisy_radii() -> None:
 
 @pytest.mark.parametrize("turn", [1, 18, 36, -25])
 def test_turned_mirrored_and_scaled_radii_give_turned_mirrored_and_scaled_ellipses(
-    turn: int,
-) -> None:
+    turn,
+):
     rng = np.random.default_rng(0)
     radii = ellipse_reach(KNOWN[:1]) * rng.uniform(0.9, 1.1, (1, len(DIRECTIONS)))
     m, n, a, b, angle = fit_ellipses(radii)[0]
@@ -78,7 +76,7 @@ def test_turned_mirrored_and_scaled_radii_give_turned_mirrored_and_scaled_ellips
     same(fit_ellipses(3 * radii), np.array([[3 * m, 3 * n, 3 * a, 3 * b, angle]]), 1e-7)
 
 
-def test_gaps_below_half_a_turn_are_filled() -> None:
+def test_gaps_below_half_a_turn_are_filled():
     radii = ellipse_reach(KNOWN[:1])
     radii[0, 3:9] = np.nan
     radii[0, -1] = np.nan  # across the seam
@@ -91,7 +89,7 @@ def test_gaps_below_half_a_turn_are_filled() -> None:
     assert np.isnan(fill_gaps(radii)).all()
 
 
-def test_gap_of_half_a_turn_is_undefined_and_named() -> None:
+def test_gap_of_half_a_turn_is_undefined_and_named():
     radii = ellipse_reach(KNOWN[:1])
     radii[0, 10:50] = np.nan
     zone = PolarZone(np.array([1.1]), DIRECTIONS, radii)
@@ -108,7 +106,7 @@ def test_gap_of_half_a_turn_is_undefined_and_named() -> None:
         PolarZone(np.array([1.1]), DIRECTIONS, np.zeros((1, 72))).ellipse(1.1)
 
 
-def test_between_speeds_radii_are_linear() -> None:
+def test_between_speeds_radii_are_linear():
     zone = PolarZone(
         np.array([0.5, 1.5]), DIRECTIONS, np.array([np.full(72, 0.8), np.full(72, 1.0)])
     )
@@ -133,15 +131,13 @@ def test_between_speeds_radii_are_linear() -> None:
         ([1.0], [0.0], [[-1.0]], "must not be negative; got -1"),
     ],
 )
-def test_invalid_radii_are_refused(
-    speeds: list, directions: list, radii: list, message: str
-) -> None:
+def test_invalid_radii_are_refused(speeds, directions, radii, message):
     with pytest.raises(szlib.ZoneError, match=message):
         PolarZone(np.array(speeds), np.array(directions), np.array(radii))
 
 
 @pytest.mark.parametrize(("speeds", "directions"), [((), (0.0, 1.0)), ((1.1,), ())])
-def test_a_zone_without_radii_is_refused(speeds: tuple, directions: tuple) -> None:
+def test_a_zone_without_radii_is_refused(speeds, directions):
     radii = np.zeros((len(speeds), len(directions)))
     with pytest.raises(
         szlib.ZoneError, match=r"radii must have shape \(speeds, directions\)"
@@ -149,7 +145,7 @@ def test_a_zone_without_radii_is_refused(speeds: tuple, directions: tuple) -> No
         PolarZone(speeds=speeds, directions=directions, radii=radii)
 
 
-def test_the_boundary_is_linear_between_directions_all_around() -> None:
+def test_the_boundary_is_linear_between_directions_all_around():
     directions = np.radians([-120.0, -30.0, 60.0, 150.0])
     zone = PolarZone(
         speeds=[1.0, 2.0],

@@ -1,13 +1,8 @@
 """Pooling over sites: published numbers, closed forms, coverage of the truth, invariances, refusals."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.typing import NDArray
 from scipy import stats
 from studies import quantile_zone
 from studies.pooling import pool
@@ -28,18 +23,16 @@ SITES = {
 }
 
 
-def triples(
-    y: NDArray[np.float64], errors: NDArray[np.float64]
-) -> dict[str, tuple[float, float, float]]:
+def triples(y, errors):
     pairs = zip(y, errors, strict=True)
     return {f"{i}": (v, v - Z * e, v + Z * e) for i, (v, e) in enumerate(pairs)}
 
 
-def numbers(pooled: szlib.Pooled) -> list[float]:
+def numbers(pooled):
     return [pooled.mean, pooled.low, pooled.high, pooled.new_low, pooled.new_high]
 
 
-def test_bcg_trials_give_the_published_numbers() -> None:
+def test_bcg_trials_give_the_published_numbers():
     """tau^2 = 0.318 by Paule and Mandel; by restricted likelihood it is 0.313, with mean -0.7145."""
     a, b, c, d = np.array([row.split() for row in BCG.split(";")], float).T
     ratio, variance = (
@@ -60,9 +53,7 @@ def test_bcg_trials_give_the_published_numbers() -> None:
     )
 
 
-def restricted_likelihood(
-    y: NDArray[np.float64], variance: NDArray[np.float64], tau2: float
-) -> float:
+def restricted_likelihood(y, variance, tau2):
     weight = 1 / (variance + tau2)
     mean = (weight * y).sum() / weight.sum()
     return (
@@ -75,7 +66,7 @@ def restricted_likelihood(
     )
 
 
-def test_equal_errors_give_the_interval_of_the_ordinary_t_test() -> None:
+def test_equal_errors_give_the_interval_of_the_ordinary_t_test():
     y = np.array([0.3, 0.9, 0.1, 0.5, 1.2])
     pooled = pool(triples(y, np.full(5, 0.2)), quantity="center_y")
     expected = stats.ttest_1samp(y, 0).confidence_interval(0.95)
@@ -86,14 +77,14 @@ def test_equal_errors_give_the_interval_of_the_ordinary_t_test() -> None:
     assert pooled.table["weight"].tolist() == pytest.approx([0.2] * 5)
 
 
-def test_sites_that_differ_less_than_by_chance_have_one_value() -> None:
+def test_sites_that_differ_less_than_by_chance_have_one_value():
     pooled = pool({"a": (1.0, 0.5, 1.5), "b": (1.01, 0.5, 1.5), "c": (0.99, 0.9, 1.1)})
     assert pooled.tau == 0
     assert pooled.table["weight"].iloc[2] > 0.8
 
 
 @pytest.mark.parametrize(("k", "tau"), [(4, 0.3), (7, 0.2), (10, 0.4)])
-def test_intervals_hold_mean_and_new_site(k: int, tau: float) -> None:
+def test_intervals_hold_mean_and_new_site(k, tau):
     rng, held, n = np.random.default_rng(k), np.zeros(2), 400
     for _ in range(n):
         errors = np.exp(rng.normal(np.log(0.1), 0.4, k))
@@ -109,13 +100,13 @@ def test_intervals_hold_mean_and_new_site(k: int, tau: float) -> None:
 # --- invariances -------------------------------------------------------------------------------------
 
 
-def test_order_of_the_sites_changes_nothing() -> None:
+def test_order_of_the_sites_changes_nothing():
     again = pool(dict(reversed(SITES.items())))
     assert numbers(again) == pytest.approx(numbers(pool(SITES)), rel=1e-9)
 
 
 @pytest.mark.parametrize("quantity", ["radius", "a", "b", "area"])
-def test_positive_quantities_follow_their_unit(quantity: str) -> None:
+def test_positive_quantities_follow_their_unit(quantity):
     pooled, scale = pool(SITES, quantity=quantity), 100.0
     scaled = {name: tuple(scale * v for v in site) for name, site in SITES.items()}
     again = pool(scaled, quantity=quantity)
@@ -124,7 +115,7 @@ def test_positive_quantities_follow_their_unit(quantity: str) -> None:
     assert again.new_low > 0
 
 
-def test_offsets_of_the_centre_move_with_their_origin() -> None:
+def test_offsets_of_the_centre_move_with_their_origin():
     moved = {name: tuple(v - 1 for v in site) for name, site in SITES.items()}
     expected = [v - 1 for v in numbers(pool(SITES, quantity="center_x"))]
     assert numbers(pool(moved, quantity="center_x")) == pytest.approx(expected)
@@ -133,7 +124,7 @@ def test_offsets_of_the_centre_move_with_their_origin() -> None:
 # --- zones -------------------------------------------------------------------------------------------
 
 
-def zone(seed: int, n_resamples: int = 30) -> szlib.SocialZone:
+def zone(seed, n_resamples=30):
     rng, n = np.random.default_rng(seed), 600
     table = {
         "encounter": np.arange(n),
@@ -145,7 +136,7 @@ def zone(seed: int, n_resamples: int = 30) -> szlib.SocialZone:
     return szlib.SocialZone.fit(samples, method=quantile_zone.NAME, **options)
 
 
-def test_zones_are_pooled_by_their_ellipse_and_its_interval() -> None:
+def test_zones_are_pooled_by_their_ellipse_and_its_interval():
     zones = {"first": zone(1), "second": zone(2), "third": zone(3)}
     for quantity, column in (
         ("radius", "area"),
@@ -167,7 +158,7 @@ def test_zones_are_pooled_by_their_ellipse_and_its_interval() -> None:
     assert pool(zones).table["value"].iloc[0] == pytest.approx(np.sqrt(a * b))
 
 
-def test_zones_without_an_interval_or_at_other_speeds_are_refused() -> None:
+def test_zones_without_an_interval_or_at_other_speeds_are_refused():
     zones = {"hall": zone(1), "bare": zone(2, n_resamples=0)}
     with pytest.raises(
         szlib.ZoneError,
@@ -181,14 +172,14 @@ def test_zones_without_an_interval_or_at_other_speeds_are_refused() -> None:
 # --- few sites, wrong sites --------------------------------------------------------------------------
 
 
-def test_two_sites_give_no_interval_of_a_new_one_and_say_why() -> None:
+def test_two_sites_give_no_interval_of_a_new_one_and_say_why():
     pooled = pool({name: SITES[name] for name in ("hall", "mall")})
     assert np.isnan([pooled.new_low, pooled.new_high]).all()
     assert np.isfinite([pooled.mean, pooled.low, pooled.high]).all()
     assert "no interval of a new site, which needs 3 sites" in str(pooled)
 
 
-def test_it_prints_one_line_with_units() -> None:
+def test_it_prints_one_line_with_units():
     text = str(pool(SITES))
     assert text.startswith("radius over 4 sites: mean 0.89 m (its 95 % interval ")
     assert "\n" not in text and "prediction interval" in text
@@ -207,15 +198,13 @@ def test_it_prints_one_line_with_units() -> None:
         (szlib.Ellipse(center=(0, 0), semi_axes=(1, 0.7)), "expected a SocialZone"),
     ],
 )
-def test_site_without_an_interval_around_its_value_is_named(
-    site: Any, said: str
-) -> None:
+def test_site_without_an_interval_around_its_value_is_named(site, said):
     with pytest.raises(szlib.ZoneError, match="site 'wrong'") as raised:
         pool({**SITES, "wrong": site})
     assert said in str(raised.value)
 
 
-def test_one_site_and_an_unknown_quantity_are_refused() -> None:
+def test_one_site_and_an_unknown_quantity_are_refused():
     for sites in ({}, {"hall": SITES["hall"]}, [SITES["hall"]] * 2):
         with pytest.raises(szlib.ZoneError, match="two or more sites by name"):
             pool(sites)  # type: ignore[arg-type]

@@ -1,9 +1,5 @@
 """Measures of the quality of a file, on files whose quality is known."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,7 +15,7 @@ LINE = "{:.3f},{},{},{},1650.0,{},0.1,0.1\n"
 
 
 @pytest.fixture
-def day(tmp_path: Path) -> Path:
+def day(tmp_path):
     """Person 1 walks at 1 m/s for 10 s, person 2 stands for 10 s an hour later, seen again after 3 s."""
     walk = [(BEGIN + k / 25, 1, round(40 * k), 0, 1000) for k in range(250)]
     stand = [(BEGIN + 3600 + k / 25, 2, 0, 0, 570) for k in range(250)]
@@ -31,7 +27,7 @@ def day(tmp_path: Path) -> Path:
     return path
 
 
-def test_seconds_have_sensor_speed_and_displacement(day: Path) -> None:
+def test_seconds_have_sensor_speed_and_displacement(day):
     rows = quality.summarise_seconds(day)
     walker, stander = rows[rows["id"] == 1], rows[rows["id"] == 2]
     np.testing.assert_allclose(walker["moved"].dropna(), 1.0)
@@ -43,7 +39,7 @@ def test_seconds_have_sensor_speed_and_displacement(day: Path) -> None:
     assert rows["rows"].sum() == 525
 
 
-def test_visits_and_standing_people_are_counted_by_hour(day: Path) -> None:
+def test_visits_and_standing_people_are_counted_by_hour(day):
     table = quality.count_visits_by_hour(
         quality.summarise_seconds(day), tz="Asia/Tokyo"
     )
@@ -54,7 +50,7 @@ def test_visits_and_standing_people_are_counted_by_hour(day: Path) -> None:
     np.testing.assert_allclose(table["standing"], [0.0, 9 / 11])
 
 
-def test_frame_intervals_and_longest_gaps(day: Path) -> None:
+def test_frame_intervals_and_longest_gaps(day):
     intervals = quality.measure_frame_intervals(day)
     assert np.isclose(np.median(intervals), 0.04, atol=1e-6)
     assert len(intervals) == 524
@@ -67,7 +63,7 @@ def test_frame_intervals_and_longest_gaps(day: Path) -> None:
     assert found["rows"].tolist() == [250, 275]
 
 
-def test_formats_without_a_speed_give_nan(tmp_path: Path) -> None:
+def test_formats_without_a_speed_give_nan(tmp_path):
     rows = pd.DataFrame(
         {"t": BEGIN + np.arange(5.0), "id": 1, "x": np.arange(5.0), "y": 0.0}
     )
@@ -82,7 +78,7 @@ def test_formats_without_a_speed_give_nan(tmp_path: Path) -> None:
     np.testing.assert_allclose(tidy["moved"], hourly["moved"])
 
 
-def test_thinning_error_of_a_bend_is_its_sagitta() -> None:
+def test_thinning_error_of_a_bend_is_its_sagitta():
     turn = 2.0 * np.arange(0, 12.01, 0.1) / 5.0  # 2 m/s on a circle of 5 m
     walk = make_walk((0, 0), (1, 0), duration=12.0)
     walk[["x", "y"]] = 5 * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -99,7 +95,7 @@ def test_thinning_error_of_a_bend_is_its_sagitta() -> None:
     assert rough == pytest.approx(4 * rms, rel=0.05), "an error of second order"
 
 
-def test_thinning_error_of_the_eth_sequence() -> None:
+def test_thinning_error_of_the_eth_sequence():
     rms, high = measure_thinning_error(
         szlib.read_tracks(real_data("eth") / "seq_eth_obsmat.txt")
     )

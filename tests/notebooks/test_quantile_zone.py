@@ -1,7 +1,5 @@
 """The quantile zone: shares are exact, it moves with the frame, noise is smoothed, size is nothing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -14,7 +12,7 @@ from szlib.zones.ellipses import DIRECTIONS, ellipse_reach
 from szlib.zones.uncertainty import SPEED_BAND
 
 
-def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:
+def ellipse(samples, **options):
     zone = szlib.SocialZone.fit(
         samples, method=quantile_zone.NAME, speeds=(1.1,), n_resamples=0, **options
     )
@@ -23,23 +21,23 @@ def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def samples() -> pd.DataFrame:
+def samples():
     return passers(2500)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_the_known_zone_is_recovered_whatever_the_number_of_people(seed: int) -> None:
+def test_the_known_zone_is_recovered_whatever_the_number_of_people(seed):
     few, many = (ellipse(passers(n, seed=seed)) for n in (600, 6000))
     np.testing.assert_allclose(few[:4], TRUTH[:4], atol=0.03)
     np.testing.assert_allclose(many[:4], TRUTH[:4], atol=0.02)
 
 
-def test_noise_does_not_shrink_the_zone() -> None:
+def test_noise_does_not_shrink_the_zone():
     still, noisy = ellipse(passers(2500)), ellipse(passers(2500, noise=0.05))
     np.testing.assert_allclose(noisy[:4], still[:4], atol=0.02)
 
 
-def test_few_intruders_change_little(samples: pd.DataFrame) -> None:
+def test_few_intruders_change_little(samples):
     through = samples["encounter"] % 50 == 0  # 2 %
     intruders = samples.assign(
         distance=np.where(through, samples["distance"] / 3, samples["distance"])
@@ -47,7 +45,7 @@ def test_few_intruders_change_little(samples: pd.DataFrame) -> None:
     np.testing.assert_allclose(ellipse(intruders)[:4], ellipse(samples)[:4], atol=0.03)
 
 
-def test_at_most_a_share_q_of_encounters_is_nearer(samples: pd.DataFrame) -> None:
+def test_at_most_a_share_q_of_encounters_is_nearer(samples):
     known = Approaches.from_samples(samples, r_max=2.0)
     encounters, nearest = known.nearest(1.1)
     assert (
@@ -61,7 +59,7 @@ def test_at_most_a_share_q_of_encounters_is_nearer(samples: pd.DataFrame) -> Non
         assert ((nearest <= radii).sum(axis=0) >= q * seen).all()
 
 
-def test_more_may_enter_a_larger_zone(samples: pd.DataFrame) -> None:
+def test_more_may_enter_a_larger_zone(samples):
     known = Approaches.from_samples(samples, r_max=2.0)
     lines = [quantile_radii(known, 1.1, q)[0] for q in (0.005, 0.02, 0.05, 0.2, 0.9)]
     assert (np.diff(lines, axis=0) >= 0).all()
@@ -70,9 +68,7 @@ def test_more_may_enter_a_larger_zone(samples: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("turn", [np.pi / 2, np.radians(35), 1.0])
-def test_rotated_samples_rotate_the_quantile_zone(
-    samples: pd.DataFrame, turn: float
-) -> None:
+def test_rotated_samples_rotate_the_quantile_zone(samples, turn):
     """Exactly by multiples of 5 deg, which the directions are apart; else nearly."""
     m, n, a, b, angle = ellipse(samples)
     cos, sin = np.cos(turn), np.sin(turn)
@@ -85,8 +81,8 @@ def test_rotated_samples_rotate_the_quantile_zone(
 
 
 def test_mirrored_people_mirror_the_zone_and_larger_people_enlarge_it(
-    samples: pd.DataFrame,
-) -> None:
+    samples,
+):
     m, n, a, b, angle = ellipse(samples)
     mirrored = ellipse(samples.assign(los_angle=-samples["los_angle"]))
     np.testing.assert_allclose(mirrored, [m, -n, a, b, -angle], atol=1e-6)
@@ -94,7 +90,7 @@ def test_mirrored_people_mirror_the_zone_and_larger_people_enlarge_it(
     np.testing.assert_allclose(twice, [2 * m, 2 * n, 2 * a, 2 * b, angle], atol=1e-6)
 
 
-def test_neither_order_nor_numbers_of_encounters_matter(samples: pd.DataFrame) -> None:
+def test_neither_order_nor_numbers_of_encounters_matter(samples):
     before = samples.copy(deep=True)
     expected = ellipse(samples)
     pd.testing.assert_frame_equal(samples, before)
@@ -109,7 +105,7 @@ def test_neither_order_nor_numbers_of_encounters_matter(samples: pd.DataFrame) -
     np.testing.assert_allclose(ellipse(days), expected, atol=1e-9)
 
 
-def test_weights_equal_copies(samples: pd.DataFrame) -> None:
+def test_weights_equal_copies(samples):
     known = Approaches.from_samples(samples, r_max=2.0)
     weights = (
         np.random.default_rng(0)
@@ -161,29 +157,27 @@ def test_weights_equal_copies(samples: pd.DataFrame) -> None:
         ),
     ],
 )
-def test_samples_without_a_quantile_zone_are_refused(
-    samples: pd.DataFrame, change: dict, error: type[Exception], message: str
-) -> None:
+def test_samples_without_a_quantile_zone_are_refused(samples, change, error, message):
     with pytest.raises(error, match=message):
         ellipse(samples.assign(**change))
     with pytest.raises(szlib.DataError, match=r"columns \['distance'\] are missing"):
         ellipse(samples.drop(columns="distance"))
 
 
-def test_a_share_of_nobody_is_refused(samples: pd.DataFrame) -> None:
+def test_a_share_of_nobody_is_refused(samples):
     message = "q must be a share of encounters, 0 < q < 1; got 0"
     with pytest.raises(szlib.ZoneError, match=message):
         ellipse(samples, q=0.0)
 
 
-def test_provenance_names_the_sector_in_degrees(samples: pd.DataFrame) -> None:
+def test_provenance_names_the_sector_in_degrees(samples):
     zone = szlib.SocialZone.fit(
         samples, method=quantile_zone.NAME, speeds=(1.1,), n_resamples=0
     )
     assert zone.provenance["parameters"]["sector_deg"] == 35
 
 
-def test_radii_are_those_of_the_truth_within_a_sector() -> None:
+def test_radii_are_those_of_the_truth_within_a_sector():
     """Who touches a nearer part of the rim within 17.5 deg counts as well: so much too small they may be."""
     radii = quantile_radii(
         Approaches.from_samples(passers(4000, clearance=1e-6), r_max=2.0), 1.1, 0.02

@@ -1,10 +1,7 @@
 """Readers of other sites: synthetic files with known people, valid tracks, refusals, and the real files."""
 
-from __future__ import annotations
-
 import json
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -22,7 +19,7 @@ TILTED = np.array([[0.04, -0.03, 70.0], [0.14, -0.003, 8.0], [1.2e-3, -5e-5, 1.0
 """From (row, column, 1) to the floor, in units of 0.8 m."""
 
 
-def pixels(floor: np.ndarray) -> np.ndarray:
+def pixels(floor):
     """Column and row at which the camera sees points of the floor [m], shape (n, 2)."""
     row, column, one = (
         np.linalg.inv(TILTED) @ np.column_stack([floor / 0.8, np.ones(len(floor))]).T
@@ -30,9 +27,7 @@ def pixels(floor: np.ndarray) -> np.ndarray:
     return np.column_stack([column / one, row / one])
 
 
-def grand_central(
-    folder: Path, people: dict[int, np.ndarray], *, first: int = 0
-) -> Path:
+def grand_central(folder, people, *, first=0):
     """An archive of people (paths (n, 2) [m]) annotated every 20th frame, and its homography."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "H.json").write_text(json.dumps({"homog": TILTED.tolist()}))
@@ -46,13 +41,11 @@ def grand_central(
     return folder / "Annotation.zip"
 
 
-def straight(
-    start: tuple[float, float], velocity: tuple[float, float], count: int = 12
-) -> np.ndarray:
+def straight(start, velocity, count=12):
     return np.asarray(start) + 0.8 * np.arange(count)[:, None] * np.asarray(velocity)
 
 
-def test_grand_central_is_projected_to_the_floor(tmp_path: Path) -> None:
+def test_grand_central_is_projected_to_the_floor(tmp_path):
     archive = grand_central(
         tmp_path, {7: straight((10, 20), (1.0, 0.5)), 12: straight((30, 45), (0, -1.5))}
     )
@@ -70,7 +63,7 @@ def test_grand_central_is_projected_to_the_floor(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(unpacked, tracks)
 
 
-def test_gaps_of_grand_central_are_not_interpolated(tmp_path: Path) -> None:
+def test_gaps_of_grand_central_are_not_interpolated(tmp_path):
     archive = grand_central(tmp_path, {1: straight((10, 20), (1, 0))})
     with zipfile.ZipFile(archive) as packed:
         rows = packed.read("Annotation/000001.txt").decode().split()
@@ -81,7 +74,7 @@ def test_gaps_of_grand_central_are_not_interpolated(tmp_path: Path) -> None:
     assert sites.read_grand_central(archive, max_gap=2.0)["t"].between(2.45, 3.95).any()
 
 
-def test_damaged_grand_central_files_are_refused(tmp_path: Path) -> None:
+def test_damaged_grand_central_files_are_refused(tmp_path):
     archive = grand_central(tmp_path / "a", {1: straight((10, 20), (1, 0))})
     with pytest.raises(
         szlib.DataError, match=r"H\.json: no such file; expected the homography"
@@ -111,7 +104,7 @@ def test_damaged_grand_central_files_are_refused(tmp_path: Path) -> None:
 # --- Edinburgh ---------------------------------------------------------------------------------------
 
 
-def edinburgh(path: Path, tracks: dict[int, list[tuple[int, int, int]]]) -> Path:
+def edinburgh(path, tracks):
     """A file in the form of Edinburgh's: histograms shortened, everything else as in the original."""
     lines = [f"% Total number of trajectories in file are  {len(tracks)} \n"]
     for number, points in tracks.items():
@@ -124,7 +117,7 @@ def edinburgh(path: Path, tracks: dict[int, list[tuple[int, int, int]]]) -> Path
     return path
 
 
-def test_edinburgh_has_nine_frames_a_second_and_y_points_up(tmp_path: Path) -> None:
+def test_edinburgh_has_nine_frames_a_second_and_y_points_up(tmp_path):
     walk = [(100 + 6 * k, 400 - 3 * k, 4471 + k) for k in range(45)]
     tracks = sites.read_edinburgh(edinburgh(tmp_path / "tracks.Aug01.txt", {1: walk}))
     check_tracks(tracks)
@@ -139,7 +132,7 @@ def test_edinburgh_has_nine_frames_a_second_and_y_points_up(tmp_path: Path) -> N
     np.testing.assert_allclose(slow["vx"], 6 * 0.0247 * 8.5, rtol=1e-6)
 
 
-def test_repeated_blobs_of_edinburgh_are_rejected(tmp_path: Path) -> None:
+def test_repeated_blobs_of_edinburgh_are_rejected(tmp_path):
     walk = [(100 + 6 * k, 200, k) for k in range(30)]
     ghost = [(100 + 6 * k, 260 - 4 * k if k < 15 else 200, k) for k in range(30)]
     twice = [*[(300, 50 + k, k) for k in range(20)], (310, 69, 19)]
@@ -162,7 +155,7 @@ def test_repeated_blobs_of_edinburgh_are_rejected(tmp_path: Path) -> None:
     )
 
 
-def test_edinburgh_files_are_separate_recordings(tmp_path: Path) -> None:
+def test_edinburgh_files_are_separate_recordings(tmp_path):
     walk = [(100 + 6 * k, 200, k) for k in range(30)]
     files = [edinburgh(tmp_path / f"tracks.Aug0{day}.txt", {1: walk}) for day in (1, 2)]
     tracks = sites.read_edinburgh(files)
@@ -175,7 +168,7 @@ def test_edinburgh_files_are_separate_recordings(tmp_path: Path) -> None:
         sites.read_edinburgh([files[0], files[0]])
 
 
-def test_damaged_edinburgh_files_are_refused(tmp_path: Path) -> None:
+def test_damaged_edinburgh_files_are_refused(tmp_path):
     file = tmp_path / "tracks.txt"
     with pytest.raises(szlib.DataError, match="cannot be read"):
         sites.read_edinburgh(file)
@@ -196,7 +189,7 @@ def test_damaged_edinburgh_files_are_refused(tmp_path: Path) -> None:
 # --- THOR-MAGNI --------------------------------------------------------------------------------------
 
 
-def write_magni(path: Path, sessions: list[dict[int, str]]) -> Path:
+def write_magni(path, sessions):
     """Sessions of 20 s, 0.01 s apart; people of one label walk side by side, 6 m from the next pair."""
     rows, begin = [], 0.01
     for labels in sessions:
@@ -233,7 +226,7 @@ SESSIONS = [
 ]
 
 
-def test_a_helmet_is_another_person_in_each_session(tmp_path: Path) -> None:
+def test_a_helmet_is_another_person_in_each_session(tmp_path):
     file = write_magni(tmp_path / "A.csv", SESSIONS)
     tracks = szlib.read_tracks(file)
     check_tracks(tracks)
@@ -259,7 +252,7 @@ def test_a_helmet_is_another_person_in_each_session(tmp_path: Path) -> None:
     np.testing.assert_allclose(tracks["vx"], 1.0, atol=1e-6)
 
 
-def test_magni_groups_are_found(tmp_path: Path) -> None:
+def test_magni_groups_are_found(tmp_path):
     groups = sites.read_magni_groups(write_magni(tmp_path / "A.csv", SESSIONS))
     found = {frozenset(people) for people in groups.groupby("group")["id"].apply(set)}
     assert found == {
@@ -272,7 +265,7 @@ def test_magni_groups_are_found(tmp_path: Path) -> None:
         sites.read_magni_groups(file)
 
 
-def test_damaged_magni_files_are_refused(tmp_path: Path) -> None:
+def test_damaged_magni_files_are_refused(tmp_path):
     file = write_magni(tmp_path / "A.csv", SESSIONS)
     rows = pd.read_csv(file)
     rows.drop(columns="data_label").to_csv(file, index=False)
@@ -296,7 +289,7 @@ def test_damaged_magni_files_are_refused(tmp_path: Path) -> None:
 # --- groups ------------------------------------------------------------------------------------------
 
 
-def test_groups_of_the_eth_sequence_are_read() -> None:
+def test_groups_of_the_eth_sequence_are_read():
     folder = real_data("eth")
     with pytest.warns(
         szlib.DataWarning, match="line 37, 38"
@@ -321,9 +314,7 @@ def test_groups_of_the_eth_sequence_are_read() -> None:
         ("1 2\n3 4.5\n", "line 2"),
     ],
 )
-def test_invalid_groups_are_refused_with_their_line(
-    tmp_path: Path, text: str, message: str
-) -> None:
+def test_invalid_groups_are_refused_with_their_line(tmp_path, text, message):
     (tmp_path / "groups.txt").write_text(text)
     with pytest.raises(szlib.DataError, match=message):
         sites.read_groups(tmp_path / "groups.txt")
@@ -331,13 +322,13 @@ def test_invalid_groups_are_refused_with_their_line(
         sites.read_groups(tmp_path)
 
 
-def test_blank_lines_in_a_group_file_are_ignored(tmp_path: Path) -> None:
+def test_blank_lines_in_a_group_file_are_ignored(tmp_path):
     (tmp_path / "groups.txt").write_text(" 5 4\n\n 6 3 2 \n")
     groups = sites.read_groups(tmp_path / "groups.txt")
     assert groups.to_numpy().tolist() == [[0, 5], [0, 4], [1, 6], [1, 3], [1, 2]]
 
 
-def test_group_lines_that_share_people_are_joined(tmp_path: Path) -> None:
+def test_group_lines_that_share_people_are_joined(tmp_path):
     (tmp_path / "groups.txt").write_text("1 2\n3 4\n5 6\n4 2 7\n")
     with pytest.warns(szlib.DataWarning, match="line 4"):
         groups = sites.read_groups(tmp_path / "groups.txt")
@@ -350,7 +341,7 @@ def test_group_lines_that_share_people_are_joined(tmp_path: Path) -> None:
 # --- the real files ----------------------------------------------------------------------------------
 
 
-def test_the_real_grand_central_is_read() -> None:
+def test_the_real_grand_central_is_read():
     tracks = sites.read_grand_central(real_data("gc") / "Annotation.zip")
     check_tracks(tracks)
     assert tracks["id"].nunique() == 12_684
@@ -361,7 +352,7 @@ def test_the_real_grand_central_is_read() -> None:
     assert pace.quantile(0.99) < 2.5
 
 
-def test_the_real_magni_is_read() -> None:
+def test_the_real_magni_is_read():
     file = real_data("magni") / "A.csv"
     tracks, groups = szlib.read_tracks(file), sites.read_magni_groups(file)
     check_tracks(tracks)

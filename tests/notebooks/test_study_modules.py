@@ -1,7 +1,5 @@
 """What the tables of studies rest on: counts, means, and truths of each module that no other test imports."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -35,7 +33,7 @@ ROWS = pd.DataFrame(
 """Ten worlds: eight arrive, one has h < 0 and infeasible steps."""
 
 
-def test_rollouts_count_worlds_and_what_happens_in_them() -> None:
+def test_rollouts_count_worlds_and_what_happens_in_them():
     line = rollout_table.row([ROWS.iloc[:5], ROWS.iloc[5:]])
     assert line["worlds"] == 10 and line["worlds of blocks"] == "5 5"
     assert line["worlds h < 0"] == 1 and line["blocks h < 0"] == "0 1"
@@ -43,13 +41,13 @@ def test_rollouts_count_worlds_and_what_happens_in_them() -> None:
     assert line["share overlap person"] == 0
 
 
-def test_gamma_is_summarised_by_arrivals_infeasible_steps_and_time() -> None:
+def test_gamma_is_summarised_by_arrivals_infeasible_steps_and_time():
     line = gamma_table.summarise(0.05, ROWS)
     assert (line["arrived"], line["infeasible steps"]) == (0.8, 3)
     assert line["worlds with h < 0"] == 1 and line["median time to goal [s]"] == 10
 
 
-def test_the_cells_of_feasibility_drive_in_the_same_worlds() -> None:
+def test_the_cells_of_feasibility_drive_in_the_same_worlds():
     cell = (0.1, 4, 1.0)
     few, more = (
         feasibility.drive_cells([cell], n, progress=False)
@@ -66,7 +64,7 @@ def test_the_cells_of_feasibility_drive_in_the_same_worlds() -> None:
 
 
 @pytest.mark.parametrize("robot", differential_table.ROBOTS)
-def test_the_disc_is_followed_to_where_the_robot_is(robot: str) -> None:
+def test_the_disc_is_followed_to_where_the_robot_is(robot):
     scenario = Worlds()(3)
     controller = differential_table.ROBOTS[robot](scenario, szlib.MPCSettings())
     log = szlib.simulate(scenario, controller, max_time=3.0)
@@ -77,7 +75,7 @@ def test_the_disc_is_followed_to_where_the_robot_is(robot: str) -> None:
     assert np.hypot(*steps.T).max() <= 1.01 * 0.1 / differential_table.SUBSTEPS
 
 
-def test_the_nearest_distance_of_two_paths_is_that_of_brute_force() -> None:
+def test_the_nearest_distance_of_two_paths_is_that_of_brute_force():
     offsets = np.random.default_rng(0).normal(0, 2, (6, 3, 2))
     share = np.linspace(0, 1, 2001)[:, None, None]
     brute = min(
@@ -90,13 +88,13 @@ def test_the_nearest_distance_of_two_paths_is_that_of_brute_force() -> None:
     assert gaps.min() >= 2 * crossings.RADIUS, "nobody starts in somebody else"
 
 
-def test_the_visits_of_all_hours_are_the_people_of_the_plaza() -> None:
+def test_the_visits_of_all_hours_are_the_people_of_the_plaza():
     found = hours.of_plaza()
     assert found["visits"].sum() == 2 * hours.SMALL.n_encounters
     assert (found["standing"] >= 0).all()
 
 
-def test_a_fit_of_many_days_has_as_many_samples_as_asked() -> None:
+def test_a_fit_of_many_days_has_as_many_samples_as_asked():
     n = 400
     rng = np.random.default_rng(0)
     one_day = pd.DataFrame(
@@ -112,7 +110,7 @@ def test_a_fit_of_many_days_has_as_many_samples_as_asked() -> None:
     assert (found["samples"], found["days"]) == (1000, 3)
 
 
-def test_a_case_is_the_plaza_that_its_row_names() -> None:
+def test_a_case_is_the_plaza_that_its_row_names():
     for case in plazas.CASES:
         settings = plazas.build(case)
         assert (settings.n_encounters, settings.intruders, settings.clearance) == case[
@@ -121,14 +119,14 @@ def test_a_case_is_the_plaza_that_its_row_names() -> None:
         assert settings.true_zone(plazas.SPEED).center[0] == pytest.approx(case[3])
 
 
-def test_an_interval_of_a_plaza_holds_the_truth_or_not() -> None:
+def test_an_interval_of_a_plaza_holds_the_truth_or_not():
     samples, null = plazas.find_both(plazas.SMALL, plazas.FIRST_SEED)
     truth = plazas.build(plazas.SMALL).true_zone(plazas.SPEED)
     for row in plazas.compare(samples, null, truth):
         assert (abs(row["error"]) > row["width"]) <= (row["held"] == 0.0)
 
 
-def test_shipped_zones_are_rounded_and_pooled_as_the_study_does() -> None:
+def test_shipped_zones_are_rounded_and_pooled_as_the_study_does():
     ellipse = szlib.Ellipse((0.12345, 0.0), (1.00049, 0.7), 0.1)
     assert reference_zones.round_ellipse(ellipse)["semi_axes"] == [1.0, 0.7]
     strangers, everybody = (
@@ -139,7 +137,7 @@ def test_shipped_zones_are_rounded_and_pooled_as_the_study_does() -> None:
     assert FILE.exists() and everybody.method == "paper"
 
 
-def test_each_change_of_the_controller_halves_or_doubles_one_number() -> None:
+def test_each_change_of_the_controller_halves_or_doubles_one_number():
     ours = walkers.OURS
     for name, settings in walkers.changed().items():
         differing = [
@@ -152,7 +150,7 @@ def test_each_change_of_the_controller_halves_or_doubles_one_number() -> None:
             assert getattr(settings, each) / getattr(ours, each) in (0.5, 2.0)
 
 
-def test_a_comparison_has_the_mean_and_the_world_that_is_driven_again() -> None:
+def test_a_comparison_has_the_mean_and_the_world_that_is_driven_again():
     metric, seeds = "time_to_goal", range(6)
     rows = pd.DataFrame(
         {

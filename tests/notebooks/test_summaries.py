@@ -1,7 +1,5 @@
 """What notebooks 25 and 26 show first: the rows that decide, the worst outcome, and folded tables."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,7 +10,7 @@ from studies.meetings import OUTCOMES, find_outcomes
 from szlib.workbook.record import read_table
 
 
-def test_answers_hold_each_claim_once_for_each_data_set() -> None:
+def test_answers_hold_each_claim_once_for_each_data_set():
     answers = claims_study.select_answers(read_table("25_claims"))
     assert not answers.duplicated(["claim", "data"]).any()
     assert "mean of sites" not in set(answers["data"])
@@ -47,7 +45,7 @@ NOTHING = {
         ({"robot_on_person": 0.1}, "body touches body"),
     ],
 )
-def test_the_worst_outcome_is_shown(found: dict[str, float], outcome: str) -> None:
+def test_the_worst_outcome_is_shown(found, outcome):
     means = NOTHING | found
     rows = [
         {"meeting": "door", "controller": "c", "metric": name, "mean": value}
@@ -58,7 +56,7 @@ def test_the_worst_outcome_is_shown(found: dict[str, float], outcome: str) -> No
     assert row["time_to_goal"] == pytest.approx(means["time_to_goal"], nan_ok=True)
 
 
-def test_a_folded_table_is_closed_and_its_summary_is_text() -> None:
+def test_a_folded_table_is_closed_and_its_summary_is_text():
     shown = fold_table("a < b", pd.DataFrame({"x [m]": [1 / 3, np.nan]}), 1).data
     assert shown.startswith("<details><summary>a &lt; b</summary>") and shown.endswith(
         "</details>"

@@ -1,7 +1,5 @@
 """A zone in the formats of other programs, read back as they read it."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys
@@ -17,7 +15,7 @@ import szlib
 
 
 @pytest.fixture(scope="module")
-def zone() -> szlib.SocialZone:
+def zone():
     rng, n = np.random.default_rng(0), 2000
     samples = pd.DataFrame(
         {"encounter": np.arange(n), "los_angle": rng.uniform(-np.pi, np.pi, n)}
@@ -29,7 +27,7 @@ def zone() -> szlib.SocialZone:
     return szlib.SocialZone.fit(samples, speeds=[0.9, 1.1, 1.3], n_resamples=20)
 
 
-def test_geojson_holds_the_ellipses(zone: szlib.SocialZone) -> None:
+def test_geojson_holds_the_ellipses(zone):
     content = json.loads(as_geojson(zone, n=180))
     assert content["type"] == "FeatureCollection"
     assert [feature["properties"]["speed"] for feature in content["features"]] == [
@@ -49,7 +47,7 @@ def test_geojson_holds_the_ellipses(zone: szlib.SocialZone) -> None:
         )
 
 
-def test_geojson_file_is_an_area(zone: szlib.SocialZone, tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_geojson_file_is_an_area(zone, tmp_path):  # type: ignore[no-untyped-def]
     one = json.loads(as_geojson(zone))["features"][1]
     (tmp_path / "zone.geojson").write_text(json.dumps(one))
     assert szlib.as_area(tmp_path / "zone.geojson").area == pytest.approx(
@@ -57,7 +55,7 @@ def test_geojson_file_is_an_area(zone: szlib.SocialZone, tmp_path) -> None:  # t
     )
 
 
-def test_ros_parameters_are_lists_of_one_type_by_speed(zone: szlib.SocialZone) -> None:
+def test_ros_parameters_are_lists_of_one_type_by_speed(zone):
     content = yaml.safe_load(as_ros_params(zone, layer="people"))
     (values,) = (content["/**"]["ros__parameters"][name] for name in ["people"])
     assert values["speeds"] == [0.9, 1.1, 1.3]
@@ -77,9 +75,7 @@ def test_ros_parameters_are_lists_of_one_type_by_speed(zone: szlib.SocialZone) -
         )
 
 
-def test_latex_needs_no_jinja(
-    zone: szlib.SocialZone, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_latex_needs_no_jinja(zone, monkeypatch):
     monkeypatch.setitem(sys.modules, "jinja2", None)
     lines = as_latex(zone).splitlines()
     assert lines[0] == r"\begin{tabular}{rllrl}" and lines[-1] == r"\end{tabular}"

@@ -1,11 +1,8 @@
 """How near to the truth: outliers against known intruders, zones against known zones, at the paper's size."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
-import pandas as pd
 import pytest
 from studies import plaza_truth
 from studies.pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
@@ -19,7 +16,7 @@ TOO_FAR, TOO_FAR_WITH_MANY = 0.035, 0.05
 
 
 @pytest.fixture(scope="module")
-def plazas() -> list[pd.DataFrame]:
+def plazas():
     """Six default plazas, together as large as the paper's data; each is staged once for file and kinds."""
     staged = cache(stage_encounters)
     with pytest.MonkeyPatch.context() as patch:
@@ -31,7 +28,7 @@ def plazas() -> list[pd.DataFrame]:
 # --- the measures ------------------------------------------------------------------------------------
 
 
-def test_true_kinds_match_the_samples(plazas: list[pd.DataFrame]) -> None:
+def test_true_kinds_match_the_samples(plazas):
     nearest = (
         plazas[0]
         .groupby("encounter")
@@ -42,7 +39,7 @@ def test_true_kinds_match_the_samples(plazas: list[pd.DataFrame]) -> None:
     assert together.groupby("encounter")["distance"].agg(np.ptp).max() < 1
 
 
-def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> None:
+def test_people_of_another_plaza_have_no_kind(plazas):
     with pytest.raises(
         szlib.DataError, match=r"row \d+: .* no pair of a plaza of 40 encounters"
     ):
@@ -52,7 +49,7 @@ def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> Non
         plaza_truth.true_kinds(strangers)
 
 
-def test_precision_and_recall() -> None:
+def test_precision_and_recall():
     removed, intruders = (
         np.array([1, 1, 1, 0, 0], bool),
         np.array([1, 0, 0, 1, 0], bool),
@@ -68,7 +65,7 @@ def test_precision_and_recall() -> None:
         precision_and_recall(removed, intruders[1:])
 
 
-def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
+def test_largest_error_is_that_of_centre_and_axes(plazas):
     zone, truth = (
         szlib.SocialZone.fit(
             plazas[0], method="hull", speeds=plaza_truth.SPEEDS, n_resamples=0
@@ -101,9 +98,7 @@ def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) ->
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_pipeline_finds_the_true_zone(
-    plazas: list[pd.DataFrame], seed: int
-) -> None:
+def test_the_pipeline_finds_the_true_zone(plazas, seed):
     zone = szlib.SocialZone.fit(
         plazas[seed], method="hull", speeds=plaza_truth.SPEEDS, n_resamples=0
     )
@@ -118,7 +113,7 @@ def test_the_pipeline_finds_the_true_zone(
 @pytest.mark.parametrize(
     ("share", "pace"), [(0.0, "rushing"), (0.01, "slow"), (0.02, "rushing")]
 )
-def test_whole_encounters_find_every_intruder(share: float, pace: str) -> None:
+def test_whole_encounters_find_every_intruder(share, pace):
     settings = szlib.PlazaSettings(intruders=share, intruder_speeds=PACES[pace])
     found = judged(plaza_samples(7, settings), settings, {})
     assert found["error"] < (TOO_FAR_WITH_MANY if share else TOO_FAR)
@@ -127,8 +122,8 @@ def test_whole_encounters_find_every_intruder(share: float, pace: str) -> None:
 
 
 def test_the_zone_does_not_shrink_at_the_size_of_the_paper(
-    plazas: list[pd.DataFrame],
-) -> None:
+    plazas,
+):
     samples = pooled(plazas)
     assert samples["encounter"].nunique() > 15_000
     found = judged(samples, szlib.PlazaSettings(), {})
@@ -136,7 +131,7 @@ def test_the_zone_does_not_shrink_at_the_size_of_the_paper(
     assert found["recall"] == 1
 
 
-def test_notebook_table_shows_it_for_all_sizes() -> None:
+def test_notebook_table_shows_it_for_all_sizes():
     table = read_table(TABLE)
     assert table["encounters"].max() > 20_000
     ours = table[table["rule"] == "encounters"]

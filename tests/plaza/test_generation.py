@@ -1,14 +1,11 @@
 """The synthetic plaza proves the pipeline: the zone that people there respect must come out of it."""
 
-from __future__ import annotations
-
 import dataclasses
 import tempfile
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import polars as pl
 import pytest
 
@@ -46,13 +43,13 @@ NAMES = ["time", "id", "x", "y", "z", "velocity", "motion_angle", "facing_angle"
 FEW = PlazaSettings(n_encounters=150)
 
 
-def hull_of(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
+def hull_of(samples, **options):
     """The hull's zone, without its intervals."""
     return szlib.SocialZone.fit(samples, method="hull", n_resamples=0, **options)
 
 
 @cache
-def tracks_of(seed: int, settings: PlazaSettings) -> pd.DataFrame:
+def tracks_of(seed, settings):
     """Tracks of a plaza, made once: copy them to change them."""
     with tempfile.TemporaryDirectory() as folder:
         return szlib.read_tracks(
@@ -61,15 +58,15 @@ def tracks_of(seed: int, settings: PlazaSettings) -> pd.DataFrame:
 
 
 @cache
-def samples_of(seed: int, settings: PlazaSettings) -> pd.DataFrame:
+def samples_of(seed, settings):
     return szlib.find_encounters(tracks_of(seed, settings))
 
 
-def raw_rows(path: Path) -> pl.DataFrame:
+def raw_rows(path):
     return pl.read_csv(path, has_header=False, new_columns=NAMES)
 
 
-def errors(zone: szlib.SocialZone, settings: PlazaSettings) -> tuple[float, float]:
+def errors(zone, settings):
     """Largest error of centre and semi-axes [m], and of orientation [deg], over `SPEEDS`."""
     metres, degrees = [], []
     for speed in SPEEDS:
@@ -85,9 +82,7 @@ def errors(zone: szlib.SocialZone, settings: PlazaSettings) -> tuple[float, floa
     return float(np.max(np.abs(metres))), float(np.max(np.abs(degrees)))
 
 
-def in_frame(
-    staged: pd.DataFrame, moments: int = 86
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def in_frame(staged, moments=86):
     """Of both people, every 0.04 s: speed, and bearing and distance of the partner, each (n, moments, 2)."""
     t = (staged["start"].to_numpy()[:, None] + np.arange(moments) * 0.04).ravel()
     where, moves = positions(staged.iloc[np.repeat(np.arange(len(staged)), moments)], t)
@@ -103,11 +98,11 @@ def in_frame(
 
 
 def levels(
-    settings: PlazaSettings,
-    speed: np.ndarray,
-    bearing: np.ndarray,
-    distance: np.ndarray,
-) -> np.ndarray:
+    settings,
+    speed,
+    bearing,
+    distance,
+):
     """Level of each point in the true zone of its own speed, one `Ellipse` a point."""
     points = np.stack(
         [distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1
@@ -119,19 +114,19 @@ def levels(
 
 
 @pytest.fixture(scope="module")
-def staged() -> pd.DataFrame:
+def staged():
     return stage_encounters(seed=3)
 
 
 @pytest.fixture(scope="module")
-def raw(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pl.DataFrame]:
+def raw(tmp_path_factory):
     path = make_plaza(
         tmp_path_factory.mktemp("raw") / "atc-20000102.csv", seed=1, settings=FEW
     )
     return path, raw_rows(path)
 
 
-def plaza_of(truth: str, n_encounters: int = 300, **others: object) -> PlazaSettings:
+def plaza_of(truth, n_encounters=300, **others):
     """A plaza without intruders and without gaps, with one of `TRUTHS` at every speed."""
     zone = TRUTHS[truth]
     settings = PlazaSettings(
@@ -141,7 +136,7 @@ def plaza_of(truth: str, n_encounters: int = 300, **others: object) -> PlazaSett
 
 
 @pytest.mark.parametrize("truth", TRUTHS)
-def test_zones_of_any_form_are_respected_and_touched(truth: str) -> None:
+def test_zones_of_any_form_are_respected_and_touched(truth):
     """Walkers stay outside, and come within 10 cm on every side that people ahead can reach."""
     staged = stage_encounters(seed=8, settings=plaza_of(truth, 200, together=0.0))
     speed, bearing, distance = in_frame(staged)
@@ -155,7 +150,7 @@ def test_zones_of_any_form_are_respected_and_touched(truth: str) -> None:
     assert [gap[sector == k].min() < 0.1 for k in range(6)] == [True] * 6
 
 
-def test_size_is_found_and_offset_and_turn_in_part() -> None:
+def test_size_is_found_and_offset_and_turn_in_part():
     """Half the offset and two thirds of the turn, whatever the seed: the notes of `PlazaSettings` say why."""
     ahead, turned = (
         szlib.SocialZone.fit(
@@ -170,8 +165,8 @@ def test_size_is_found_and_offset_and_turn_in_part() -> None:
 
 
 def test_zones_without_space_around_them_are_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     monkeypatch.setattr(generation, "_MAX_ROUNDS", 200)
     zone = szlib.Ellipse((0.0, 0.0), (1.9, 1.9))
     settings = PlazaSettings(
@@ -184,10 +179,10 @@ def test_zones_without_space_around_them_are_refused(
         stage_encounters(settings=settings)
 
 
-def test_plaza_at_1_hz_has_encounters_and_shows_the_zone() -> None:
+def test_plaza_at_1_hz_has_encounters_and_shows_the_zone():
     """People who are seen for 5.4 s have four samples at 1 Hz: a window of 3 s, whenever they come."""
 
-    def thinned(tracked: float) -> pd.DataFrame:
+    def thinned(tracked):
         tracks = tracks_of(9, plaza_of("centred", 400, tracked=tracked))
         each_second = nearest_tick(tracks["t"].to_numpy()) % 10 == 0
         return to_clock(
@@ -201,7 +196,7 @@ def test_plaza_at_1_hz_has_encounters_and_shows_the_zone() -> None:
     np.testing.assert_allclose(found.semi_axes, TRUTHS["centred"].semi_axes, atol=0.05)
 
 
-def test_pairs_are_seen_as_long_as_asked_and_walk_straight_before() -> None:
+def test_pairs_are_seen_as_long_as_asked_and_walk_straight_before():
     settings = plaza_of("centred", 100, tracked=12.0)
     staged = stage_encounters(seed=1, settings=settings)
     assert np.diff(staged["start"]).min() > 12
@@ -221,7 +216,7 @@ def test_pairs_are_seen_as_long_as_asked_and_walk_straight_before() -> None:
     assert (szlib.find_encounters(tracks)["kind"] == "companions").any()
 
 
-def test_tilted_truth_is_found() -> None:
+def test_tilted_truth_is_found():
     zone = hull_of(samples_of(4, ASIDE))
     metres, degrees = errors(zone, ASIDE)
     assert metres < 0.05
@@ -231,7 +226,7 @@ def test_tilted_truth_is_found() -> None:
     )
 
 
-def test_truth_without_intruders_is_found_with_and_without_outlier_removal() -> None:
+def test_truth_without_intruders_is_found_with_and_without_outlier_removal():
     samples = samples_of(4, POLITE)
     for fraction in (0.002, 0.0):
         metres, degrees = errors(hull_of(samples, fraction=fraction), POLITE)
@@ -239,7 +234,7 @@ def test_truth_without_intruders_is_found_with_and_without_outlier_removal() -> 
         assert degrees < 10
 
 
-def test_intruders_spoil_the_zone_unless_outliers_are_removed() -> None:
+def test_intruders_spoil_the_zone_unless_outliers_are_removed():
     samples = samples_of(3, DEFAULT)
     assert errors(hull_of(samples), DEFAULT)[0] < 0.05
     try:
@@ -249,7 +244,7 @@ def test_intruders_spoil_the_zone_unless_outliers_are_removed() -> None:
     assert metres > 0.15
 
 
-def test_swapped_x_and_y_are_detected() -> None:
+def test_swapped_x_and_y_are_detected():
     tracks = tracks_of(4, ASIDE)
     swapped = tracks.rename(columns={"x": "y", "y": "x", "vx": "vy", "vy": "vx"})
     assert len(szlib.find_encounters(swapped)) < len(samples_of(4, ASIDE)) / 2
@@ -258,13 +253,13 @@ def test_swapped_x_and_y_are_detected() -> None:
     assert errors(zone, ASIDE)[1] > 10
 
 
-def test_late_clock_of_some_people_is_detected() -> None:
+def test_late_clock_of_some_people_is_detected():
     tracks = tracks_of(4, POLITE).copy()
     tracks.loc[tracks["id"] % 200 == 0, "t"] += 0.2
     assert errors(hull_of(szlib.find_encounters(tracks)), POLITE)[0] > 0.1
 
 
-def test_only_intruders_enter_a_zone(staged: pd.DataFrame) -> None:
+def test_only_intruders_enter_a_zone(staged):
     some = staged.iloc[::20]
     speed, bearing, distance = in_frame(some)
     level = levels(DEFAULT, speed, bearing, distance)
@@ -276,7 +271,7 @@ def test_only_intruders_enter_a_zone(staged: pd.DataFrame) -> None:
     assert (levels(DEFAULT, *in_frame(intruders))[..., 0].min(axis=1) < 0.4).all()
 
 
-def test_all_kinds_of_motion_occur(staged: pd.DataFrame) -> None:
+def test_all_kinds_of_motion_occur(staged):
     assert set(staged["kind"]) == set(KINDS)
     other = np.hypot(staged["other_vx"], staged["other_vy"])
     walker = np.hypot(staged["walker_vx"], staged["walker_vy"])
@@ -298,7 +293,7 @@ def test_all_kinds_of_motion_occur(staged: pd.DataFrame) -> None:
     assert (kind.value_counts() > 100).drop("intruder").all()
 
 
-def test_shares_match_the_settings() -> None:
+def test_shares_match_the_settings():
     counts = stage_encounters(
         settings=PlazaSettings(
             n_encounters=400, standing=0.1, together=0.2, intruders=0.05
@@ -308,7 +303,7 @@ def test_shares_match_the_settings() -> None:
     assert (counts["standing"], counts["together"], counts["intruder"]) == (40, 80, 20)
 
 
-def test_slow_intruders_leave_more_samples(tmp_path: Path) -> None:
+def test_slow_intruders_leave_more_samples(tmp_path):
     """Slow ones leave many samples deep within the zone, rushing ones a few; both pass as near."""
     inside, nearest = {}, {}
     for pace in (RUSHING_INTRUDERS, SLOW_INTRUDERS):
@@ -330,7 +325,7 @@ def test_slow_intruders_leave_more_samples(tmp_path: Path) -> None:
     )
 
 
-def test_intruders_of_any_speed_are_slow_and_rushing() -> None:
+def test_intruders_of_any_speed_are_slow_and_rushing():
     settings = PlazaSettings(
         n_encounters=400, intruders=0.5, intruder_speeds=ANY_SPEED_INTRUDERS
     )
@@ -344,14 +339,14 @@ def test_intruders_of_any_speed_are_slow_and_rushing() -> None:
     assert shares.sum() == 1
 
 
-def test_most_pairs_are_detected_as_encounters(staged: pd.DataFrame) -> None:
+def test_most_pairs_are_detected_as_encounters(staged):
     samples = samples_of(3, DEFAULT)
     refs = set(samples["ref_id"])
     walkers = 9_190_600 + 200 * np.arange(len(staged))
     assert np.mean([walker in refs for walker in walkers]) > 0.9
 
 
-def test_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_same_seed_gives_the_same_bytes(tmp_path):
     one, same, other = (
         make_plaza(tmp_path / f"{k}.csv", seed=seed, settings=FEW).read_bytes()
         for k, seed in enumerate((5, 5, 6))
@@ -360,7 +355,7 @@ def test_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     assert one != other
 
 
-def test_file_has_the_format_of_the_sensor(raw: tuple[Path, pl.DataFrame]) -> None:
+def test_file_has_the_format_of_the_sensor(raw):
     path, rows = raw
     assert path.read_text().splitlines()[0].count(",") == 7
     assert (rows["time"].diff().drop_nulls() >= 0).all()
@@ -382,14 +377,14 @@ def test_file_has_the_format_of_the_sensor(raw: tuple[Path, pl.DataFrame]) -> No
     assert rows["z"].is_between(1_300, 2_000).all()
 
 
-def test_the_velocity_column_is_inflated(tmp_path: Path) -> None:
+def test_the_velocity_column_is_inflated(tmp_path):
     standing = PlazaSettings(n_encounters=50, standing=1.0, together=0.0, intruders=0.0)
     rows = raw_rows(make_plaza(tmp_path / "standing.csv", settings=standing))
     still = rows.filter(pl.col("id") % 200 == 100)
     assert 400 < still["velocity"].median() < 700
 
 
-def test_tracks_have_gaps_short_and_long(tmp_path: Path) -> None:
+def test_tracks_have_gaps_short_and_long(tmp_path):
     broken = PlazaSettings(n_encounters=300, short_gaps=0.5, long_gaps=0.3)
     rows = raw_rows(make_plaza(tmp_path / "gaps.csv", settings=broken))
     steps = (
@@ -402,7 +397,7 @@ def test_tracks_have_gaps_short_and_long(tmp_path: Path) -> None:
     assert 150 < (steps > 0.5).sum() < 210  # 180
 
 
-def test_day_matches_the_date(tmp_path: Path) -> None:
+def test_day_matches_the_date(tmp_path):
     tracks = szlib.read_tracks(
         make_plaza(
             tmp_path / "p.csv",
@@ -412,7 +407,7 @@ def test_day_matches_the_date(tmp_path: Path) -> None:
     assert list(tracks["day"].unique()) == ["2001-05-06"]
 
 
-def test_truth_is_linear_in_speed() -> None:
+def test_truth_is_linear_in_speed():
     settings = PlazaSettings(
         slow_zone=szlib.Ellipse((0.0, 0.0), (0.80, 0.70), np.pi / 2 - 0.04),
         fast_zone=szlib.Ellipse((0.04, 0.02), (0.84, 0.72), 0.04 - np.pi / 2),
@@ -444,7 +439,7 @@ def test_truth_is_linear_in_speed() -> None:
         {"area": szlib.as_area("POLYGON ((0 0, 40 0, 0 40, 0 0))")},
     ],
 )
-def test_invalid_settings_are_refused(given: dict[str, object]) -> None:
+def test_invalid_settings_are_refused(given):
     with pytest.raises(szlib.DataError, match="got"):
         PlazaSettings(**given)  # type: ignore[arg-type]
 
@@ -453,12 +448,12 @@ def test_invalid_settings_are_refused(given: dict[str, object]) -> None:
     "zone",
     [szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), szlib.Ellipse((0.0, 0.0), (2.1, 2.0))],
 )
-def test_truth_that_is_no_zone_within_r_max_is_refused(zone: szlib.Ellipse) -> None:
+def test_truth_that_is_no_zone_within_r_max_is_refused(zone):
     with pytest.raises(szlib.ZoneError, match="contain the person"):
         PlazaSettings(slow_zone=zone, fast_zone=zone)
 
 
-def test_missing_folder_is_refused_and_no_file_remains(tmp_path: Path) -> None:
+def test_missing_folder_is_refused_and_no_file_remains(tmp_path):
     with pytest.raises(szlib.SzlibError, match="cannot be written"):
         make_plaza(tmp_path / "nowhere" / "plaza.csv", settings=FEW)
     make_plaza(tmp_path / "plaza.csv", settings=FEW)

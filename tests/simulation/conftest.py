@@ -3,11 +3,11 @@
 import pytest
 from helpers.crowd_models import FACTORIES, PACKAGES
 
-from szlib.simulation.crowds import WALKING_MODELS, ModelFactory
+from szlib.simulation.crowds import WALKING_MODELS
 
 
 @pytest.fixture(params=FACTORIES)
-def model(request: pytest.FixtureRequest) -> str | ModelFactory:
+def model(request):
     """Every model of walking whose package, if it needs one, is installed."""
     if request.param in PACKAGES:
         pytest.importorskip(PACKAGES[request.param])

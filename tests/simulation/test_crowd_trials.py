@@ -1,7 +1,5 @@
 """Safety claims hold among reacting and recorded people.  In full: `notebooks/studies/crowd_trials.py`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -18,7 +16,7 @@ from studies.social_metrics import compute_replay_metrics
 import szlib
 from szlib.control.people import Person
 from szlib.simulation.closed_loop import LoopSettings, drive
-from szlib.simulation.crowds import ModelFactory, ReactingPeople
+from szlib.simulation.crowds import ReactingPeople
 from szlib.simulation.monte_carlo import RolloutSetup
 from szlib.simulation.scenario import Scenario
 
@@ -31,13 +29,13 @@ class Careless:
     settings = szlib.MPCSettings()
     zone = ZONE
 
-    def reset(self) -> None: ...
+    def reset(self): ...
 
-    def step(self, state: object, goal: object, people: object) -> SimpleNamespace:
+    def step(self, state, goal, people):
         return SimpleNamespace(control=np.zeros(2), safe=True)
 
 
-def straight(*people: Person, y: float = 0.0) -> Scenario:
+def straight(*people, y=0.0):
     """The robot drives from (-4, y) to (4, y) at 1 m/s."""
     return Scenario(
         "straight",
@@ -49,9 +47,7 @@ def straight(*people: Person, y: float = 0.0) -> Scenario:
 
 
 @pytest.mark.parametrize("sees", ["robot", "nothing"])
-def test_claims_hold_for_people_who_keep_their_velocity(
-    model: str | ModelFactory, sees: str
-) -> None:
+def test_claims_hold_for_people_who_keep_their_velocity(model, sees):
     rows = szlib.rollouts(
         3,
         RolloutSetup(
@@ -66,7 +62,7 @@ def test_claims_hold_for_people_who_keep_their_velocity(
     assert (rows["broken_steps"] <= rows["unflagged_violations"]).all()
 
 
-def crossing(seed: int) -> pd.DataFrame:
+def crossing(seed):
     """A person walks 10 m; eight people cross, turn, stop, come and go."""
     rng, walks = (
         np.random.default_rng(seed),
@@ -83,7 +79,7 @@ def crossing(seed: int) -> pd.DataFrame:
     return make_tracks(*walks)
 
 
-def h_if_they_had_kept_on(log: szlib.SimulationLog) -> np.ndarray:
+def h_if_they_had_kept_on(log):
     """h one step after each but the last, if each person keeps their velocity, shape (n - 1, P).
 
     By the sum of the distances to the foci, from positions alone; NaN for people who are absent.
@@ -102,7 +98,7 @@ def h_if_they_had_kept_on(log: szlib.SimulationLog) -> np.ndarray:
     )
 
 
-def test_claims_hold_among_recorded_people_who_keep_their_velocity() -> None:
+def test_claims_hold_among_recorded_people_who_keep_their_velocity():
     rows = []
     for seed in (0, 3, 5):  # claims are void in the last two
         for made in find_replays(crossing(seed), 3, zone=ZONE):
@@ -125,7 +121,7 @@ def test_claims_hold_among_recorded_people_who_keep_their_velocity() -> None:
     ).all(axis=None)
 
 
-def test_false_safety_claims_are_found() -> None:
+def test_false_safety_claims_are_found():
     log = drive(straight(Person((0.0, 0.2), (-0.3, 0.0))), Careless())
     broken = safety_violations(log)
     assert set(broken["change"]) == {"kept their velocity"}
@@ -158,9 +154,7 @@ def test_false_safety_claims_are_found() -> None:
         ((np.nan, np.nan), (0.5, 0.0), 0.0, "came"),
     ],
 )
-def test_the_change_of_motion_is_classified(
-    given: tuple, walked: tuple, turned: float, did: str
-) -> None:
+def test_the_change_of_motion_is_classified(given, walked, turned, did):
     log = drive(
         straight(Person((0.0, 0.0), heading=0.0)),
         Careless(),
@@ -180,7 +174,7 @@ def test_the_change_of_motion_is_classified(
     assert row["h"] < 0
 
 
-def test_intrusions_are_counted_from_geometry() -> None:
+def test_intrusions_are_counted_from_geometry():
     circle = szlib.Ellipse((0.0, 0.0), (1.0, 1.0))
     through = drive(
         straight(Person((0.0, 0.6), heading=0.0)),
@@ -207,7 +201,7 @@ def test_intrusions_are_counted_from_geometry() -> None:
     assert np.isnan(empty["nearest"])
 
 
-def test_the_replaced_walker_is_measured_with_their_time_and_path() -> None:
+def test_the_replaced_walker_is_measured_with_their_time_and_path():
     for made in find_replays(crossing(0), 9, zone=ZONE):
         log = drive(
             made.scenario,
@@ -222,7 +216,7 @@ def test_the_replaced_walker_is_measured_with_their_time_and_path() -> None:
         assert log.states[: len(path), :2] == pytest.approx(path)
 
 
-def test_replays_are_worlds_and_behaviour_of_rollouts() -> None:
+def test_replays_are_worlds_and_behaviour_of_rollouts():
     made = find_replays(crossing(3), 2, zone=ZONE)
     rows = szlib.rollouts(
         len(made),

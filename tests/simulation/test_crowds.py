@@ -1,13 +1,10 @@
 """Crowds: reacting people reach their goals, replayed people are where they were recorded."""
 
-from __future__ import annotations
-
 import cmath
 import math
 import sys
 
 import numpy as np
-import pandas as pd
 import pytest
 from helpers.crowd_models import scene
 from helpers.track_tables import make_tracks, make_walk
@@ -15,14 +12,12 @@ from studies.replay import (
     MIN_START_DISTANCE,
     SENSING_RANGE,
     ReplacedWalker,
-    Replay,
     find_replays,
 )
 
 import szlib
 from szlib.control.people import Person
 from szlib.simulation.crowds import (
-    Crowd,
     ModelFactory,
     ReactingPeople,
     SocialForceModel,
@@ -36,7 +31,7 @@ FAR = np.array([50.0, 50.0, 0.0, 0.0])
 TWO = (Person((-4.0, 0.0), (0.5, 0.0)), Person((4.0, 0.1), (-0.5, 0.0)))
 
 
-def walk(crowd: Crowd, robot: np.ndarray = FAR, seconds: float = 20.0) -> np.ndarray:
+def walk(crowd, robot=FAR, seconds=20.0):
     """x, y, vx, vy, heading of each person every 0.1 s, shape (n, P, 5); a robot that moves drives on."""
     rows = []
     for k in range(round(seconds * 10) + 1):
@@ -47,12 +42,12 @@ def walk(crowd: Crowd, robot: np.ndarray = FAR, seconds: float = 20.0) -> np.nda
     return np.array(rows)
 
 
-def gaps(paths: np.ndarray) -> np.ndarray:
+def gaps(paths):
     """Distance of the first two people at each time [m]."""
     return np.hypot(*(paths[:, 0, :2] - paths[:, 1, :2]).T)
 
 
-def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model: Model) -> None:
+def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model):
     path = walk(
         ReactingPeople(model, jitter=0).start(scene(TWO[0], duration=10.0), 0),
         seconds=10.0,
@@ -65,21 +60,21 @@ def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model: Model) -
     )
 
 
-def test_velocity_is_the_displacement_per_time_step(model: Model) -> None:
+def test_velocity_is_the_displacement_per_time_step(model):
     paths = walk(ReactingPeople(model).start(scene(*TWO), 3))
     assert np.diff(paths[:, :, :2], axis=0) == pytest.approx(
         0.1 * paths[1:, :, 2:4], abs=1e-6
     )
 
 
-def test_two_people_who_meet_head_on_pass_each_other(model: Model) -> None:
+def test_two_people_who_meet_head_on_pass_each_other(model):
     head_on = (TWO[0], Person((4.0, 0.0), (-0.5, 0.0)))
     paths = walk(ReactingPeople(model).start(scene(*head_on), 1))
     assert paths[-1, 0, 0] > 3 and paths[-1, 1, 0] < -3
     assert gaps(paths).min() > 0.35
 
 
-def test_people_avoid_the_robot_only_if_they_see_it(model: Model) -> None:
+def test_people_avoid_the_robot_only_if_they_see_it(model):
     alone = scene(Person((-4.0, 0.1), (0.5, 0.0)))
     robot = np.array([0.0, 0.0, 0.0, 0.0])
     nearest = {
@@ -97,7 +92,7 @@ def test_people_avoid_the_robot_only_if_they_see_it(model: Model) -> None:
         assert nearest["robot"] > 0.5 + BODY_RADIUS - 0.11
 
 
-def test_people_do_not_walk_through_walls(model: Model) -> None:
+def test_people_do_not_walk_through_walls(model):
     wall = [[(0.0, -1.0), (0.0, 1.5)]]
     paths = walk(
         ReactingPeople(model).start(scene(TWO[0], walls=wall), 2), seconds=40.0
@@ -106,14 +101,14 @@ def test_people_do_not_walk_through_walls(model: Model) -> None:
     assert all(not -1.0 <= paths[k, 1] <= 1.5 for k in crossing)
 
 
-def test_standing_people_keep_position_and_heading(model: Model) -> None:
+def test_standing_people_keep_position_and_heading(model):
     standing = Person((0.0, 3.0), heading=1.0)
     path = walk(ReactingPeople(model).start(scene(standing), 0))[:, 0]
     assert path[:, :2] == pytest.approx(np.tile((0.0, 3.0), (201, 1)), abs=1e-3)
     assert (path[:, 4] == 1.0).all()
 
 
-def test_people_walk_to_given_goals(model: Model) -> None:
+def test_people_walk_to_given_goals(model):
     crowd = ReactingPeople(model, goals=((3.0, 4.0),), jitter=0).start(
         scene(Person((0.0, 0.0), heading=0.0)), 0
     )
@@ -122,8 +117,8 @@ def test_people_walk_to_given_goals(model: Model) -> None:
 
 
 def test_the_same_seed_gives_the_same_people_and_another_seed_others(
-    model: Model,
-) -> None:
+    model,
+):
     first, again, other = (
         walk(ReactingPeople(model).start(scene(*TWO), seed)) for seed in (1, 1, 2)
     )
@@ -131,7 +126,7 @@ def test_the_same_seed_gives_the_same_people_and_another_seed_others(
     assert not np.allclose(first, other, atol=1e-4)
 
 
-def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model: Model) -> None:
+def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model):
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     crowd = ReactingPeople(model).start(
         scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0
@@ -144,16 +139,14 @@ def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model: Model) ->
 class Straight:
     """People who walk straight on, whatever is there: a `WalkingModel`."""
 
-    def __init__(self, walkers: Walkers) -> None:
+    def __init__(self, walkers):
         self.walking = walkers.velocities
 
-    def velocities(
-        self, positions: np.ndarray, robot: np.ndarray, dt: float
-    ) -> np.ndarray:
+    def velocities(self, positions, robot, dt):
         return self.walking
 
 
-def test_a_class_can_be_the_model_of_walking() -> None:
+def test_a_class_can_be_the_model_of_walking():
     paths = walk(ReactingPeople(Straight).start(scene(*TWO), 0))
     assert paths[:, :, 2:4] == pytest.approx(
         np.tile([(0.5, 0.0), (-0.5, 0.0)], (201, 1, 1))
@@ -161,14 +154,14 @@ def test_a_class_can_be_the_model_of_walking() -> None:
     assert paths[-1, :, :2] == pytest.approx(np.array([(6.0, 0.0), (-6.0, 0.1)]))
 
 
-def test_models_of_walking_are_part_of_the_key_of_rollouts() -> None:
-    models: list[Model] = ["orca", "social force", Straight, SocialForceModel]
+def test_models_of_walking_are_part_of_the_key_of_rollouts():
+    models = ["orca", "social force", Straight, SocialForceModel]
     keys = [identify(ReactingPeople(model)) for model in models]
     assert len(set(keys)) == 4
     assert keys == [identify(ReactingPeople(model)) for model in models]
 
 
-def test_decreasing_time_is_rejected(model: Model) -> None:
+def test_decreasing_time_is_rejected(model):
     crowd = ReactingPeople(model).start(scene(*TWO), 0)
     crowd(0.5, FAR)
     assert crowd(0.5, FAR)[0] == crowd(0.5, FAR)[0]
@@ -177,14 +170,14 @@ def test_decreasing_time_is_rejected(model: Model) -> None:
 
 
 def test_a_missing_package_is_named_with_its_install_command(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     monkeypatch.setitem(sys.modules, "pyrvo", None)
     with pytest.raises(szlib.SolverError, match=r"pip install .*crowds"):
         ReactingPeople("orca").start(scene(*TWO), 0)
 
 
-def test_invalid_parameters_are_rejected() -> None:
+def test_invalid_parameters_are_rejected():
     with pytest.raises(
         szlib.SolverError,
         match="orca, social force, or make a model from walkers; got 'boids'",
@@ -198,7 +191,7 @@ def test_invalid_parameters_are_rejected() -> None:
         ReactingPeople("orca", goals=((0.0, 0.0),)).start(scene(*TWO), 0)
 
 
-def push_of_person(here: complex, other: complex, v: complex, w: complex) -> complex:
+def push_of_person(here, other, v, w):
     """The push of Moussaid et al. (2009), with the numbers of PySocialForce, in complex numbers."""
     away = (here - other) / abs(here - other)
     along = away - 2 * (v - w)
@@ -211,7 +204,7 @@ def push_of_person(here: complex, other: complex, v: complex, w: complex) -> com
     return 5.1 * (push - 1j * turn) * along
 
 
-def test_social_force_is_the_formula_of_its_source() -> None:
+def test_social_force_is_the_formula_of_its_source():
     """One step of three people and the robot beside a wall, person by person and point by point."""
     rng = np.random.default_rng(0)
     places, goals = rng.uniform(-2, 2, (2, 3)) + 1j * rng.uniform(-2, 2, (2, 3))
@@ -242,7 +235,7 @@ def test_social_force_is_the_formula_of_its_source() -> None:
 # --- replay ------------------------------------------------------------------------------------------
 
 
-def recording() -> pd.DataFrame:
+def recording():
     """One walks 8 m; one crosses in front of them; one comes late; one stands; one is far away."""
     return make_tracks(
         make_walk((0, 0), (1.0, 0.0), person=1, begin=10.0, duration=8.0),
@@ -253,11 +246,11 @@ def recording() -> pd.DataFrame:
     )
 
 
-def replay_of(tracks: pd.DataFrame, person: int) -> Replay:
+def replay_of(tracks, person):
     return next(each for each in find_replays(tracks, 99) if each.walker.id == person)
 
 
-def test_a_replay_has_the_start_and_goal_of_the_walker_and_all_other_people() -> None:
+def test_a_replay_has_the_start_and_goal_of_the_walker_and_all_other_people():
     replay = replay_of(recording(), 1)
     assert replay.scenario.start == pytest.approx((0, 0, 0.99, 0)), (
         "as fast as they were, or as it may be"
@@ -267,7 +260,7 @@ def test_a_replay_has_the_start_and_goal_of_the_walker_and_all_other_people() ->
     assert {other.id for other in replay.others} == {2, 3, 4, 5}
 
 
-def test_replayed_people_are_at_their_recorded_positions() -> None:
+def test_replayed_people_are_at_their_recorded_positions():
     tracks = recording()
     crowd, robot = (
         replay_of(tracks, 1).start(scene(), 0),
@@ -290,7 +283,7 @@ def test_replayed_people_are_at_their_recorded_positions() -> None:
     ]
 
 
-def test_positions_between_ticks_are_interpolated() -> None:
+def test_positions_between_ticks_are_interpolated():
     crowd = replay_of(recording(), 1).start(scene(), 0)
     (other,) = (
         p
@@ -300,7 +293,7 @@ def test_positions_between_ticks_are_interpolated() -> None:
     assert other.position == pytest.approx((4.0, -4.0 + 1.0 + 1.23))
 
 
-def test_a_person_who_stops_keeps_their_heading() -> None:
+def test_a_person_who_stops_keeps_their_heading():
     tracks = make_tracks(
         make_walk((0, 0), (1.0, 0.0), person=1, duration=8.0),
         make_walk((0, 3), (0.0, 1.0), person=2, duration=2.0),
@@ -311,7 +304,7 @@ def test_a_person_who_stops_keeps_their_heading() -> None:
     assert facing == pytest.approx([np.pi / 2] * 4)
 
 
-def test_the_walker_replaced_can_be_driven_like_a_controller() -> None:
+def test_the_walker_replaced_can_be_driven_like_a_controller():
     replay = replay_of(recording(), 1)
     walker = ReplacedWalker(replay)
     own = walker.robot.start(replay.scenario.start)
@@ -325,7 +318,7 @@ def test_the_walker_replaced_can_be_driven_like_a_controller() -> None:
     assert np.array(bodies)[81:, :2] == pytest.approx(np.tile((8.0, 0.0), (20, 1)))
 
 
-def test_replays_start_and_end_in_the_area_away_from_people() -> None:
+def test_replays_start_and_end_in_the_area_away_from_people():
     area = szlib.Square(x=(1.0, 7.0), y=(-5.0, 5.0))
     (replay,) = (
         each for each in find_replays(recording(), 99, area=area) if each.walker.id == 1
@@ -344,7 +337,7 @@ def test_replays_start_and_end_in_the_area_away_from_people() -> None:
         find_replays(recording(), 5, area=szlib.Square(x=(0.0, 1.0), y=(0.0, 1.0)))
 
 
-def test_the_seed_selects_the_walkers() -> None:
+def test_the_seed_selects_the_walkers():
     ids = [
         [each.walker.id for each in find_replays(recording(), 2, seed=seed)]
         for seed in (0, 0, 1, 2, 3)
@@ -353,7 +346,7 @@ def test_the_seed_selects_the_walkers() -> None:
     assert len({tuple(each) for each in ids}) > 1
 
 
-def test_each_day_is_a_separate_scene() -> None:
+def test_each_day_is_a_separate_scene():
     other_day = make_walk(
         (4, 1), (0.0, 1.0), person=2, begin=10.0, duration=9.0, day="2012-10-28"
     )

@@ -1,10 +1,7 @@
 """The Gymnasium environment of notebooks/examples: its runs and barriers are those of szlib.simulation."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +14,12 @@ EXAMPLES = Path(__file__).parents[2] / "notebooks" / "examples"
 
 
 @pytest.fixture
-def example(monkeypatch: pytest.MonkeyPatch) -> Any:
+def example(monkeypatch):
     monkeypatch.syspath_prepend(EXAMPLES)
     return importlib.import_module("gymnasium_env")
 
 
-def test_gymnasium_finds_no_fault_in_it(example: Any) -> None:
+def test_gymnasium_finds_no_fault_in_it(example):
     """Warnings are errors in all tests."""
     from gymnasium.utils.env_checker import check_env
 
@@ -30,7 +27,7 @@ def test_gymnasium_finds_no_fault_in_it(example: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["corridor", "making_room", "world 3"])
-def test_a_controller_has_the_run_of_the_closed_loop(example: Any, name: str) -> None:
+def test_a_controller_has_the_run_of_the_closed_loop(example, name):
     scenario = szlib.SCENARIOS[name] if name in szlib.SCENARIOS else szlib.Worlds()(3)
     env = example.SocialEnv(lambda _: scenario)
     controller = szlib.MPCCBF(env.zone, walls=scenario.walls, settings=env.settings)
@@ -51,8 +48,8 @@ def test_a_controller_has_the_run_of_the_closed_loop(example: Any, name: str) ->
 
 
 def test_the_observation_has_the_nearest_people_and_walls_with_their_h(
-    example: Any,
-) -> None:
+    example,
+):
     scenario = szlib.Scenario(
         "hall",
         start=(1.0, 2.0, 0.5, 0.0),
@@ -77,7 +74,7 @@ def test_the_observation_has_the_nearest_people_and_walls_with_their_h(
     ).all()
 
 
-def test_being_too_close_too_fast_or_too_late_is_seen(example: Any) -> None:
+def test_being_too_close_too_fast_or_too_late_is_seen(example):
     person = szlib.Person((0.5, 0.0), (0.4, 0.0))
     scenario = szlib.Scenario(
         "close", (0.0, 0.0, 3.0, 0.0), (9.0, 0.0), (person,), duration=0.2
@@ -93,7 +90,7 @@ def test_being_too_close_too_fast_or_too_late_is_seen(example: Any) -> None:
     assert env.step((0.0, 0.0))[2:4] == (False, True)
 
 
-def test_a_world_is_drawn_from_the_seed_or_named(example: Any) -> None:
+def test_a_world_is_drawn_from_the_seed_or_named(example):
     env = example.SocialEnv(szlib.Worlds(people=(2, 2)))
     first, second = env.reset(seed=1)[1]["world"], env.reset()[1]["world"]
     assert first != second and env.reset(seed=1)[1]["world"] == first

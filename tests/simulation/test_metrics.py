@@ -1,7 +1,5 @@
 """Each metric of motion on a run made by hand, whose answer is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -22,14 +20,14 @@ FAR_AWAY = (50.0, 50.0)
 
 
 def make_run(
-    states: object,
-    *people: object,
-    walls: object = (),
-    goal: tuple[float, float] = (10.0, 0.0),
-    residual: float = 1.0,
-    arrival: int | None = None,
-    **steps: object,
-) -> Run:
+    states,
+    *people,
+    walls=(),
+    goal=(10.0, 0.0),
+    residual=1.0,
+    arrival=None,
+    **steps,
+):
     """A run in these states (n, 4) among people who stand at (x, y), or are at (n, 2); dt is 0.1 s."""
     states = np.array(states, float)
     n = len(states)
@@ -58,7 +56,7 @@ def make_run(
     )
 
 
-def with_speeds(speeds: object) -> np.ndarray:
+def with_speeds(speeds):
     """States along x at these speeds, each for 0.1 s."""
     speeds = np.array(speeds, float)
     x = np.append(0.0, np.cumsum(0.1 * speeds)[:-1])
@@ -75,7 +73,7 @@ STAND, START, CRUISE, SLOW, BRAKE = (
 JOURNEY = STAND + START + CRUISE + [0.04] * 4 + SLOW + CRUISE + BRAKE
 
 
-def test_speeds_and_times_of_a_journey() -> None:
+def test_speeds_and_times_of_a_journey():
     states = with_speeds(JOURNEY + [0.8] * 5)
     n = len(JOURNEY)
     found = compute_metrics(make_run(states, arrival=n - 1))
@@ -93,26 +91,26 @@ def test_speeds_and_times_of_a_journey() -> None:
     assert alone["min_speed"] == 0.97
 
 
-def test_without_arrival_every_state_counts() -> None:
+def test_without_arrival_every_state_counts():
     found = compute_metrics(make_run(with_speeds(JOURNEY + [0.0] * 5)))
     assert not found["success"] and np.isnan(found["time_to_goal"])
     assert found["time_stopped"] == pytest.approx(0.4 + 0.5)
 
 
-def test_the_start_up_lasts_a_second() -> None:
+def test_the_start_up_lasts_a_second():
     for standing, least in ((9, 1.0), (10, 1.0), (11, 0.0)):
         speeds = [0.0] * standing + [1.0] * 10
         assert compute_metrics(make_run(with_speeds(speeds)))["min_speed"] == least
 
 
-def test_jerk_is_the_mean_square_of_the_second_derivative_of_velocity() -> None:
+def test_jerk_is_the_mean_square_of_the_second_derivative_of_velocity():
     t = 0.1 * np.arange(12)
     states = np.column_stack([0 * t, 0 * t, t**2, 1.5 * t**2])
     assert compute_metrics(make_run(states))["jerk"] == pytest.approx(2**2 + 3**2)
     assert compute_metrics(make_run(states[:2]))["jerk"] == 0
 
 
-def test_distances_to_people_and_walls_are_separate() -> None:
+def test_distances_to_people_and_walls_are_separate():
     states = with_speeds([1.0] * 41)
     wall = [[(-5.0, -2.0), (20.0, -2.0)]]
     found = compute_metrics(make_run(states, (2.0, 1.5), FAR_AWAY, walls=wall))
@@ -128,7 +126,7 @@ def test_distances_to_people_and_walls_are_separate() -> None:
     assert np.isnan(alone["min_h_people"]) and np.isnan(alone["min_clearance_walls"])
 
 
-def test_steps_are_counted_if_their_control_is_applied() -> None:
+def test_steps_are_counted_if_their_control_is_applied():
     """The person is in the way: h < 0 within 1.25 m of them, an overlap within 0.75 m."""
     states = with_speeds([2.0] * 11)  # x = 0, 0.2, ..., 2.0
     n, person = len(states), (2.0, 0.0)
@@ -157,12 +155,12 @@ def test_steps_are_counted_if_their_control_is_applied() -> None:
     assert found["solve_time_max"] == 1.0
 
 
-def test_a_start_in_violation_is_no_step() -> None:
+def test_a_start_in_violation_is_no_step():
     states = with_speeds([0.0, 0.0])
     assert compute_metrics(make_run(states, (1.0, 0.0)))["violations"] == 1
 
 
-def test_the_robot_yields_while_a_person_holds_it_back() -> None:
+def test_the_robot_yields_while_a_person_holds_it_back():
     speeds = [1.0] * 12 + [0.049] * 5 + [0.051] * 5 + [-0.5] * 3 + [1.0] * 3
     run = make_run(with_speeds(speeds), FAR_AWAY, residual=1e-4)
     assert np.flatnonzero(find_yielding_steps(run)).tolist() == [
@@ -176,7 +174,7 @@ def test_the_robot_yields_while_a_person_holds_it_back() -> None:
     assert compute_metrics(unknown)["time_yielding"] == 0
 
 
-def test_neither_the_first_second_nor_standing_at_the_goal_is_yielding() -> None:
+def test_neither_the_first_second_nor_standing_at_the_goal_is_yielding():
     early = make_run(with_speeds([0.0] * 15), FAR_AWAY, residual=0.0)
     assert np.flatnonzero(find_yielding_steps(early)).tolist() == [10, 11, 12, 13]
     for distance, steps in ((0.09, 0), (0.11, 4)):
@@ -188,7 +186,7 @@ def test_neither_the_first_second_nor_standing_at_the_goal_is_yielding() -> None
     assert len(find_yielding_steps(over)) == 14
 
 
-def test_the_course_has_the_goal_ahead() -> None:
+def test_the_course_has_the_goal_ahead():
     states = np.array([[0, 0, 0, 0], [3, 4, 0, 0]], float)
     ahead, left = locate_along_course(
         make_run(states, (-4.0, 3.0), (3.0, 4.0), goal=(6.0, 8.0)), 0
@@ -197,7 +195,7 @@ def test_the_course_has_the_goal_ahead() -> None:
 
 
 @pytest.mark.parametrize(("y", "side"), [(1.0, "right"), (-1.0, "left")])
-def test_the_side_is_that_of_the_nearest_person(y: float, side: str) -> None:
+def test_the_side_is_that_of_the_nearest_person(y, side):
     states = with_speeds([1.0] * 41)
     assert find_passing_side(make_run(states, (2.0, y))) == side
     assert (
@@ -214,14 +212,14 @@ def test_the_side_is_that_of_the_nearest_person(y: float, side: str) -> None:
     assert find_passing_side(make_run(states)) == "none"
 
 
-def test_who_is_overtaken_twice_is_passed_on_the_last_side() -> None:
+def test_who_is_overtaken_twice_is_passed_on_the_last_side():
     states = with_speeds([1.0] * 41)
     x = np.where(np.arange(41) < 15, 1.0, np.where(np.arange(41) < 20, 2.5, 3.0))
     person = np.column_stack([x, np.where(np.arange(41) < 15, 1.0, -1.0)])
     assert find_passing_side(make_run(states, person)) == "left"
 
 
-def test_avoidance_starts_at_a_tenth_of_a_metre_from_the_line() -> None:
+def test_avoidance_starts_at_a_tenth_of_a_metre_from_the_line():
     # 0.2 m beside
     states = np.array([[0, 0, 0, 0], [3, 4, 0, 0], [6.16, 7.88, 0, 0], [9, 12, 0, 0]])
     run = make_run(states, (9.0, 12.0), goal=(9.0, 12.0))

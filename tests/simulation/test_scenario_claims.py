@@ -1,9 +1,5 @@
 """Each claim about a scenario fails on a run that contradicts it."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -15,9 +11,7 @@ SETTINGS = szlib.MPCSettings()
 ACTIVE, INACTIVE = 0.0, 1.0
 
 
-def make_run(
-    name: str, xy: object, *, arrives: bool = True, residual: float = INACTIVE
-) -> Run:
+def make_run(name, xy, *, arrives=True, residual=INACTIVE):
     """A run of the paper's scenario of this `name` along given positions, one a time step."""
     positions, dt = np.array(xy, float), SETTINGS.dt
     n, scenario = len(positions), szlib.SCENARIOS[name]
@@ -44,7 +38,7 @@ def make_run(
     )
 
 
-def walk(*corners: tuple[float, float], speed: float = 1.0) -> np.ndarray:
+def walk(*corners, speed=1.0):
     """Positions along straight lines between `corners`, at constant speed."""
     parts = []
     for a, b in zip(corners[:-1], corners[1:], strict=True):
@@ -53,7 +47,7 @@ def walk(*corners: tuple[float, float], speed: float = 1.0) -> np.ndarray:
     return np.vstack([*parts, corners[-1:]])
 
 
-def evade_at(distance: float, side: float = -0.2) -> np.ndarray:
+def evade_at(distance, side=-0.2):
     """Straight at the person of the first scenario; 0.1 m beside the line at about this distance."""
     x = -distance
     return np.vstack(
@@ -61,16 +55,16 @@ def evade_at(distance: float, side: float = -0.2) -> np.ndarray:
     )
 
 
-def stand(at: tuple[float, float], seconds: float) -> np.ndarray:
+def stand(at, seconds):
     return np.tile(at, (round(seconds / SETTINGS.dt), 1))
 
 
-def wait_and_enter(at: float) -> np.ndarray:
+def wait_and_enter(at):
     """Into the restricted pathway, at this time [s] after the start, and through it."""
     return np.vstack([stand((-2.0, 0.0), at - 2.0), walk((-2.0, 0.0), (6.0, 0.0))])
 
 
-FAILURES: dict[tuple[str, str], Callable[[], list[Run]]] = {
+FAILURES = {
     ("passing", "Avoidance starts farther away head-on than from behind."): lambda: [
         make_run("passing", evade_at(1.3))
     ],
@@ -126,7 +120,7 @@ FAILURES: dict[tuple[str, str], Callable[[], list[Run]]] = {
 
 
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
-def test_every_claim_fails_on_runs_that_contradict_it(name: str) -> None:
+def test_every_claim_fails_on_runs_that_contradict_it(name):
     for claim in szlib.SCENARIOS[name].claims:
         runs = FAILURES[name, claim.text]()
         assert runs
@@ -135,7 +129,7 @@ def test_every_claim_fails_on_runs_that_contradict_it(name: str) -> None:
             assert not holds, f"{claim.text} got {value}"
 
 
-def check(name: str, text: str, run: Run) -> tuple[bool, float]:
+def check(name, text, run):
     (claim,) = (claim for claim in szlib.SCENARIOS[name].claims if text in claim.text)
     return claim.check(run)
 
@@ -143,7 +137,7 @@ def check(name: str, text: str, run: Run) -> tuple[bool, float]:
 @pytest.mark.parametrize(
     ("distance", "holds"), [(1.70, False), (1.80, True), (2.5, True)]
 )
-def test_well_before_the_zone_is_half_a_metre(distance: float, holds: bool) -> None:
+def test_well_before_the_zone_is_half_a_metre(distance, holds):
     found, h = check("passing", "well before", make_run("passing", evade_at(distance)))
     assert found == holds
     halfway = (distance + np.hypot(distance, 0.2)) / 2  # h is interpolated
@@ -153,9 +147,7 @@ def test_well_before_the_zone_is_half_a_metre(distance: float, holds: bool) -> N
 @pytest.mark.parametrize(
     ("entry", "holds"), [(7.5, False), (8.0, False), (8.5, True), (12.0, True)]
 )
-def test_the_time_between_leaving_and_entering_decides(
-    entry: float, holds: bool
-) -> None:
+def test_the_time_between_leaving_and_entering_decides(entry, holds):
     """The person leaves the pathway at 8 s; the robot is outside until one step before it enters."""
     found, between = check(
         "waiting", "enters", make_run("waiting", wait_and_enter(entry))
@@ -165,9 +157,7 @@ def test_the_time_between_leaving_and_entering_decides(
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.85, False), (0.75, True)])
-def test_slow_is_less_than_four_fifths_of_the_greatest_speed(
-    share: float, holds: bool
-) -> None:
+def test_slow_is_less_than_four_fifths_of_the_greatest_speed(share, holds):
     """The robot passes within 1 m of the person, who walks at 0.5 m/s towards it."""
     fast = walk((-4.0, -1.5), (0.0, -1.5))
     run = make_run(
@@ -179,7 +169,7 @@ def test_slow_is_less_than_four_fifths_of_the_greatest_speed(
     )
 
 
-def test_the_robot_waits_for_a_second_without_going_back() -> None:
+def test_the_robot_waits_for_a_second_without_going_back():
     held = make_run(
         "waiting",
         np.vstack([stand((-2.0, 0.0), 3.0), wait_and_enter(2.0)]),
@@ -198,6 +188,6 @@ def test_the_robot_waits_for_a_second_without_going_back() -> None:
 
 
 @pytest.mark.parametrize(("back", "holds"), [(0.45, False), (0.55, True)])
-def test_room_is_made_by_going_back_half_a_metre(back: float, holds: bool) -> None:
+def test_room_is_made_by_going_back_half_a_metre(back, holds):
     run = make_run("making_room", walk((1.2, 0.0), (1.2 - back, 0.0), (6.0, 0.0)))
     assert check("making_room", "make room", run) == (holds, pytest.approx(back))

@@ -124,13 +124,13 @@ def test_a_missing_column_is_named():
         judge_claims(pd.DataFrame({"claim": []}))
 
 
-def find_notebook(number: str) -> Path:
+def find_notebook(number):
     (script,) = (s for s in folders.list_notebooks() if s.stem.split("_")[0] == number)
     return script
 
 
 @cache
-def read_copy(script: Path) -> tuple[bool, str]:
+def read_copy(script):
     """Whether the executed copy has the cells of the script, and what it printed."""
     copy = nbformat.read(script.with_suffix(".ipynb"), as_version=4)
     same = [c.source for c in copy.cells] == [
@@ -153,7 +153,7 @@ def test_rows_are_complete_and_hold_no_verdict():
         assert row["how"] or row["kind"] in {"implemented", "claim", "stress"}, row
 
 
-def plain(text: str) -> str:
+def plain(text):
     """Words of LaTeX or of a quotation, without commands, citations and punctuation."""
     text = re.sub(r"\\cite[pt]?\{[^}]*\}|~?\\ref\{[^}]*\}", "", text)
     text = re.sub(r"\\(jwc|textbf|textcolor\{black\}|mbox)\{", " ", text)

@@ -1,7 +1,5 @@
 """`szlib inspect` and `szlib extract`: their output and exit codes."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -22,14 +20,12 @@ from szlib.workbook.cli import main
 
 
 @pytest.fixture(scope="module")
-def day(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def day(tmp_path_factory):
     path = tmp_path_factory.mktemp("day") / "atc-20121024.csv"
     return make_plaza(path, settings=PlazaSettings(n_encounters=40))
 
 
-def test_inspect_prints_a_funnel_that_adds_up(
-    day: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inspect_prints_a_funnel_that_adds_up(day, capsys):
     spoilt = day.with_name("spoilt.csv")
     spoilt.write_text(day.read_text() + "1,2\n")
     assert main(["inspect", str(spoilt)]) == 0
@@ -57,18 +53,18 @@ def test_inspect_prints_a_funnel_that_adds_up(
 
 
 def test_file_may_be_called_like_a_number(
-    day: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    day,
+    tmp_path,
+    monkeypatch,
+    capsys,
+):
     (tmp_path / "-1").write_bytes(day.read_bytes())
     monkeypatch.chdir(tmp_path)
     assert main(["inspect", "-1"]) == 0
     assert "read -1" in capsys.readouterr().out
 
 
-def test_ctrl_c_while_the_command_is_imported_shows_no_traceback() -> None:
+def test_ctrl_c_while_the_command_is_imported_shows_no_traceback():
     program = """
 import os, signal, sys
 class Interrupt:
@@ -85,9 +81,7 @@ main()"""
     assert (done.returncode, done.stderr) == (-signal.SIGINT, b"")
 
 
-def test_extract_prints_the_table(
-    day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_extract_prints_the_table(day, tmp_path, capsys):
     assert main(["extract", str(day), "--out", str(tmp_path / "out")]) == 0
     assert "1 done" in capsys.readouterr().out
     (tmp_path / "bad.csv").write_text("rubbish\n")
@@ -96,9 +90,7 @@ def test_extract_prints_the_table(
     assert "1 failed, 1 kept" in capsys.readouterr().out
 
 
-def test_error_is_one_line_and_a_traceback_if_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_error_is_one_line_and_a_traceback_if_asked_for(tmp_path, monkeypatch, capsys):
     monkeypatch.delenv("SZLIB_TRACEBACK", raising=False)
     assert main(["inspect", str(tmp_path / "missing.csv")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -109,19 +101,17 @@ def test_error_is_one_line_and_a_traceback_if_asked_for(
     assert (first, last) == ("Traceback (most recent call last):", line)
 
 
-def test_memory_that_is_no_amount_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_memory_that_is_no_amount_is_refused(tmp_path, capsys):
     assert main(["inspect", str(tmp_path), "--memory", "much"]) == 2
     assert "memory 'much': expected an amount such as 4GB" in capsys.readouterr().err
 
 
 def test_error_names_an_address_without_scheduler(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     distributed = pytest.importorskip("distributed")
 
-    def refuse(*_: object, **__: object) -> None:
+    def refuse(*_, **__):
         raise OSError("Timed out trying to connect")
 
     monkeypatch.setattr(distributed, "Client", refuse)
@@ -135,7 +125,7 @@ def test_error_names_an_address_without_scheduler(
         assert client is None
 
 
-def test_extract_waits_for_workers_that_come_late(day: Path, tmp_path: Path) -> None:
+def test_extract_waits_for_workers_that_come_late(day, tmp_path):
     """As in a queue: the scheduler is up, its workers start later; without `--wait` the error says so."""
     pytest.importorskip("distributed")
     scheduler_file = tmp_path / "scheduler.json"
@@ -193,9 +183,7 @@ def test_extract_waits_for_workers_that_come_late(day: Path, tmp_path: Path) -> 
     assert len(list((tmp_path / "out").glob("*.parquet"))) == 1
 
 
-def test_inspect_says_that_nobody_walks_where_it_finds_no_area(
-    day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inspect_says_that_nobody_walks_where_it_finds_no_area(day, tmp_path, capsys):
     tracks = szlib.read_tracks(day)[["t", "id", "x", "y"]]
     tracks[["x", "y"]] *= 0.3
     tracks.to_csv(tmp_path / "slow.csv", index=False)

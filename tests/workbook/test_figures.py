@@ -122,7 +122,7 @@ def tracks():
     )
 
 
-def in_metres(ax) -> bool:
+def in_metres(ax):
     return (
         "[m]" in ax.get_xlabel() and "[m]" in ax.get_ylabel() and ax.get_aspect() == 1
     )

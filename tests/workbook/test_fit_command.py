@@ -1,9 +1,5 @@
 """`szlib fit`: from extracted days, or tracks, to a zone with its table, verdict and figure."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from helpers.faulty_disk import FaultyDisk
 
@@ -13,7 +9,7 @@ from szlib.workbook.cli import main
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recording(tmp_path_factory):
     """A day with enough encounters for a zone, and its extraction beside it, in `days`."""
     folder = tmp_path_factory.mktemp("recording")
     plaza = szlib.PlazaSettings(n_encounters=700, date="2012-10-24")
@@ -23,19 +19,17 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def few_shifts(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_shifts(monkeypatch):
     """Fewer shifts of the null model than a user gets: the most expensive part of `szlib fit`."""
     monkeypatch.setattr(fit_command, "N_RESAMPLES", 20)
     monkeypatch.setattr("szlib.workbook.record.data_cache.NULL_SHIFTS", 3)
 
 
-def fit(*arguments: object) -> int:
+def fit(*arguments):
     return main(["fit", *map(str, arguments)])
 
 
-def test_zone_from_tracks_is_that_of_the_library(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_zone_from_tracks_is_that_of_the_library(recording, tmp_path, capsys):
     out = tmp_path / "zone.json"
     assert fit(recording, "--out", out) == 0
     printed, zone = capsys.readouterr().out, szlib.SocialZone.load(out)
@@ -58,9 +52,7 @@ def test_zone_from_tracks_is_that_of_the_library(
 
 @pytest.mark.filterwarnings("always::szlib.DataWarning")
 @pytest.mark.parametrize("method", ["respect", "paper"])
-def test_rejected_rows_are_told_and_move_no_zone(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], method: str
-) -> None:
+def test_rejected_rows_are_told_and_move_no_zone(recording, tmp_path, capsys, method):
     lines = recording.read_text().splitlines()
     for k in range(50, len(lines), 100):  # one field is missing in 1 % of the rows
         lines[k] = ",".join(lines[k].split(",")[:-1])
@@ -76,9 +68,7 @@ def test_rejected_rows_are_told_and_move_no_zone(
     assert sizes[1] == pytest.approx(sizes[0], abs=0.03)
 
 
-def test_columns_of_other_names_and_units_are_read(
-    recording: Path, tmp_path: Path
-) -> None:
+def test_columns_of_other_names_and_units_are_read(recording, tmp_path):
     tracks = szlib.read_tracks(recording)[["t", "id", "x", "y"]]
     tracks[["x", "y"]] *= 100
     tracks.set_axis(["Zeit", "Person", "Ost", "Nord"], axis=1).to_csv(
@@ -102,8 +92,8 @@ def test_columns_of_other_names_and_units_are_read(
 
 
 def test_extracted_days_have_no_null_model_until_their_tracks_are_given(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    recording, tmp_path, capsys
+):
     days, out = recording.with_name("days"), tmp_path / "zone.json"
     assert fit(days, "--out", out, "--method", "paper") == 0
     assert szlib.SocialZone.load(out).null_test is None
@@ -115,7 +105,7 @@ def test_extracted_days_have_no_null_model_until_their_tracks_are_given(
     assert "no null model" not in capsys.readouterr().out
 
 
-def test_kinds_are_those_of_the_library(recording: Path, tmp_path: Path) -> None:
+def test_kinds_are_those_of_the_library(recording, tmp_path):
     days, out = recording.with_name("days"), tmp_path / "zone.json"
     assert fit(days, "--out", out, "--kind", "opposite", "crossing") == 0
     samples = szlib.Extraction.load(days).samples()
@@ -125,9 +115,7 @@ def test_kinds_are_those_of_the_library(recording: Path, tmp_path: Path) -> None
     assert szlib.SocialZone.load(out).ellipses == expected.ellipses
 
 
-def test_excluded_day_is_not_fitted(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-):
+def test_excluded_day_is_not_fitted(recording, tmp_path, capsys):
     arguments = [
         recording.with_name("days"),
         "--out",
@@ -187,12 +175,12 @@ def test_excluded_day_is_not_fitted(
     ],
 )
 def test_what_cannot_be_fitted_is_refused_at_once(
-    recording: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    message: str,
-) -> None:
+    recording,
+    tmp_path,
+    capsys,
+    arguments,
+    message,
+):
     (tmp_path / "other.json").write_text("{}")
     (tmp_path / "plan.png").write_bytes(b"a map of the hall")
     (tmp_path / "other.csv").write_text("t,id,x,y\n0,1,0,0\n")
@@ -208,9 +196,7 @@ def test_what_cannot_be_fitted_is_refused_at_once(
     assert recording.read_bytes() == before and not (tmp_path / "zone.json").exists()
 
 
-def test_too_few_encounters_are_said_with_what_is_missing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_too_few_encounters_are_said_with_what_is_missing(tmp_path, capsys):
     day = szlib.make_plaza(
         tmp_path / "few.csv", settings=szlib.PlazaSettings(n_encounters=1)
     )
@@ -224,9 +210,7 @@ def test_too_few_encounters_are_said_with_what_is_missing(
     assert not (tmp_path / "zone.json").exists()
 
 
-def test_damaged_day_is_named(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_damaged_day_is_named(recording, tmp_path, capsys):
     szlib.extract_days(recording, out=tmp_path / "days", progress=False)
     file = tmp_path / "days" / "2012-10-24.parquet"
     file.write_bytes(file.read_bytes()[:-9])
@@ -237,9 +221,7 @@ def test_damaged_day_is_named(
     )
 
 
-def test_a_full_disk_leaves_the_earlier_zone(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_full_disk_leaves_the_earlier_zone(recording, tmp_path, capsys):
     days, out = recording.with_name("days"), tmp_path / "zone.json"
     assert fit(days, "--out", out) == 0
     before = out.read_bytes()

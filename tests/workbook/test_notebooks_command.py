@@ -1,12 +1,9 @@
 """The workbook without a checkout: what a wheel holds, `szlib notebooks`, and `szlib run` on such a copy."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import nbformat
@@ -21,7 +18,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*IPython.*:DeprecationWarning")
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+def wheel(tmp_path_factory):
     """The wheel that a build front end makes of this tree."""
     out = tmp_path_factory.mktemp("wheel")
     code = f"import dist; print(dist.build_wheel({str(out)!r}))"
@@ -35,7 +32,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     return zipfile.ZipFile(file)
 
 
-def test_the_wheel_holds_the_workbook_and_stays_small(wheel: zipfile.ZipFile) -> None:
+def test_the_wheel_holds_the_workbook_and_stays_small(wheel):
     inside = {
         name.removeprefix("szlib/workbook/notebooks/") for name in wheel.namelist()
     }
@@ -70,18 +67,16 @@ def test_the_wheel_holds_the_workbook_and_stays_small(wheel: zipfile.ZipFile) ->
     assert size < 650_000, f"{size} bytes"
 
 
-def test_the_build_leaves_the_tree_as_it_was(wheel: zipfile.ZipFile) -> None:
+def test_the_build_leaves_the_tree_as_it_was(wheel):
     assert wheel.testzip() is None
     assert not (ROOT / "szlib" / "workbook" / "notebooks").exists()
 
 
 @pytest.fixture
-def installed(
-    notebooks: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., Path]:
+def installed(notebooks, tmp_path, monkeypatch):
     """A workbook that an installed package holds; the current folder is another one."""
 
-    def write(**codes: str) -> Path:
+    def write(**codes):
         folder = notebooks(**codes)
         (folder / "exercises").mkdir(exist_ok=True)
         (folder / "exercises" / "sheet1_tracks.py").write_text(
@@ -98,8 +93,8 @@ def installed(
 
 @pytest.mark.usefixtures("without_kernels")
 def test_an_installed_package_copies_its_notebooks_and_runs_the_copy(
-    installed: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    installed, tmp_path, capsys
+):
     source = installed(_01_one='record.check("ok", True)')
     assert main(["notebooks", "course"]) == 0
     assert "szlib run" in capsys.readouterr().out
@@ -125,8 +120,8 @@ def test_an_installed_package_copies_its_notebooks_and_runs_the_copy(
 
 @pytest.mark.usefixtures("without_kernels")
 def test_run_takes_the_notebooks_of_the_current_folder_else_those_of_the_package(
-    installed: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+    installed, capsys
+):
     installed(_01_one="")
     assert main(["run", "--data", "mine.csv", "-j", "1"]) == 0
     assert list(
@@ -139,9 +134,7 @@ def test_run_takes_the_notebooks_of_the_current_folder_else_those_of_the_package
     capsys.readouterr()
 
 
-def test_a_copy_never_replaces_a_file(
-    installed: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_copy_never_replaces_a_file(installed, capsys):
     installed(_01_one="")
     Path("course/notebooks").mkdir(parents=True)
     Path("course/notebooks/my work.txt").write_text("mine")
@@ -156,9 +149,7 @@ def test_a_copy_never_replaces_a_file(
     assert [file.name for file in Path("course/notebooks").iterdir()] == ["my work.txt"]
 
 
-def test_a_folder_without_notebooks_and_a_misspelt_verb_are_refused(
-    installed: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_without_notebooks_and_a_misspelt_verb_are_refused(installed, capsys):
     installed(_01_one="")
     with pytest.raises(
         DataError, match="nowhere: there are no notebooks; expected a folder"

@@ -1,9 +1,6 @@
 """What `szlib run` writes for machines: JUnit XML, no progress bar in a log."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,13 +14,13 @@ GOOD = 'record.check("sum", True, 2)\nrecord.claim("paper", False, 0.25)'
 BAD = 'record.check("a < b & c", False, "\\x1b[0m")\nrecord.check("fine", True)'
 
 
-def run(*arguments: str) -> int:
+def run(*arguments):
     return main(["run", "--data", "mine.csv", "--out", "out", "-j", "1", *arguments])
 
 
 def test_junit_has_a_suite_for_each_notebook_and_a_case_for_each_check(
-    notebooks: Callable[..., Path],
-) -> None:
+    notebooks,
+):
     notebooks(_01_good=GOOD, _02_bad=BAD, _03_crash="1 / 0")
     assert run("--junit", "junit.xml") == 1
     assert run("--junit", "junit.xml") == 1, "written again"
@@ -64,8 +61,8 @@ def test_junit_has_a_suite_for_each_notebook_and_a_case_for_each_check(
 
 
 def test_undecided_and_not_started_notebooks_are_skipped_in_junit(
-    notebooks: Callable[..., Path],
-) -> None:
+    notebooks,
+):
     notebooks(_02_wrong="import szlib\nraise szlib.DataError('wrong')", _07_later="")
     assert run("--junit", "junit.xml") == 2
     root = ET.parse("junit.xml").getroot()
@@ -75,9 +72,7 @@ def test_undecided_and_not_started_notebooks_are_skipped_in_junit(
 
 
 @pytest.mark.parametrize("seconds", [0, 1e-5, 2.3456789, 98765.4])
-def test_junit_is_valid_in_the_schema_of_jenkins(
-    tmp_path: Path, seconds: float
-) -> None:
+def test_junit_is_valid_in_the_schema_of_jenkins(tmp_path, seconds):
     """With every status, whatever the time, and with control characters in names and messages."""
     check = {
         "kind": "check",
@@ -115,7 +110,7 @@ def test_junit_is_valid_in_the_schema_of_jenkins(
         ),
     ],
 )
-def test_the_schema_of_jenkins_refuses(suite: str, problem: str) -> None:
+def test_the_schema_of_jenkins_refuses(suite, problem):
     assert problem in "\n".join(
         violations(ET.fromstring(f"<testsuites>{suite}</testsuites>"))
     )
@@ -129,20 +124,18 @@ def test_the_schema_of_jenkins_refuses(suite: str, problem: str) -> None:
     ],
 )
 def test_junit_file_that_cannot_be_written_is_refused_before_the_run(
-    notebooks: Callable[..., Path],
-    capsys: pytest.CaptureFixture[str],
-    place: str,
-    message: str,
-) -> None:
+    notebooks,
+    capsys,
+    place,
+    message,
+):
     notebooks(_01_good=GOOD)
     assert run("--junit", place) == 2
     assert message in capsys.readouterr().err
     assert not Path("out").exists()
 
 
-def test_a_log_has_no_progress_bar(
-    notebooks: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_log_has_no_progress_bar(notebooks, capsys):
     notebooks(_01_good=GOOD)
     assert run() == 0
     assert capsys.readouterr().err == ""

@@ -1,7 +1,5 @@
 """A zone of one ellipse for each speed: its boundary lies on it; between speeds it turns and grows evenly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,11 +16,11 @@ KNOWN = np.array(
 )
 
 
-def ellipse_of(row: np.ndarray) -> szlib.Ellipse:
+def ellipse_of(row):
     return szlib.Ellipse(row[:2], row[2:4], row[4])
 
 
-def test_the_reach_of_an_ellipse_ends_on_it() -> None:
+def test_the_reach_of_an_ellipse_ends_on_it():
     for row, reach in zip(KNOWN, ellipse_reach(KNOWN), strict=True):
         ellipse = szlib.Ellipse(row[:2], row[2:4], row[4])
         points = reach[:, None] * np.column_stack(
@@ -35,7 +33,7 @@ def test_the_reach_of_an_ellipse_ends_on_it() -> None:
 
 
 @pytest.mark.parametrize("row", KNOWN)
-def test_the_boundary_at_a_fitted_speed_lies_on_its_ellipse(row: np.ndarray) -> None:
+def test_the_boundary_at_a_fitted_speed_lies_on_its_ellipse(row):
     zone = EllipseZone({0.9: ellipse_of(KNOWN[2]), 1.1: ellipse_of(row)})
     assert zone.ellipse(1.1) == ellipse_of(row)
     points = zone.boundary(1.1, DIRECTIONS)
@@ -45,7 +43,7 @@ def test_the_boundary_at_a_fitted_speed_lies_on_its_ellipse(row: np.ndarray) -> 
     assert zone.boundary(1.1, 0.0).shape == (2,)
 
 
-def test_half_way_between_two_speeds_the_squares_of_the_axes_are_half_way() -> None:
+def test_half_way_between_two_speeds_the_squares_of_the_axes_are_half_way():
     slow, fast = szlib.Ellipse((0, 0), (1, 0.6)), szlib.Ellipse((0.2, 0), (1.4, 0.8))
     middle = EllipseZone({0.5: slow, 1.5: fast}).ellipse(1.0)
     np.testing.assert_allclose(middle.center, (0.1, 0))
@@ -54,7 +52,7 @@ def test_half_way_between_two_speeds_the_squares_of_the_axes_are_half_way() -> N
 
 
 @pytest.mark.parametrize("turn", [0.3, 1.5, 3.0])
-def test_turned_ellipses_are_turned_between_speeds_too(turn: float) -> None:
+def test_turned_ellipses_are_turned_between_speeds_too(turn):
     """Also where their angles lie on both sides of the jump from pi / 2 to - pi / 2."""
     ends = {0.5: ellipse_of(KNOWN[0]), 1.5: ellipse_of(KNOWN[3])}
     turned = {v: e.placed((0, 0), turn) for v, e in ends.items()}
@@ -64,13 +62,13 @@ def test_turned_ellipses_are_turned_between_speeds_too(turn: float) -> None:
 
 
 @pytest.mark.parametrize("speed", [0.4, 1.6, np.nan])
-def test_there_is_no_zone_outside_of_the_fitted_speeds(speed: float) -> None:
+def test_there_is_no_zone_outside_of_the_fitted_speeds(speed):
     zone = EllipseZone({0.5: ellipse_of(KNOWN[0]), 1.5: ellipse_of(KNOWN[1])})
     message = r"undefined: it was fitted for 0\.5 to 1\.5 m/s"
     with pytest.raises(szlib.ZoneError, match=message):
         zone.ellipse(speed)
 
 
-def test_a_zone_without_ellipses_is_refused() -> None:
+def test_a_zone_without_ellipses_is_refused():
     with pytest.raises(szlib.ZoneError, match="needs an ellipse for one speed"):
         EllipseZone({})

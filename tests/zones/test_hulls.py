@@ -1,7 +1,5 @@
 """Hull, slices and the zone's boundary, against linear programming and ray casting."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -18,7 +16,7 @@ CUBE = np.array(
 )
 
 
-def cloud(seed: int, n: int = 60) -> np.ndarray:
+def cloud(seed, n=60):
     """Points all around the origin of the complementary plane, at all speeds."""
     rng = np.random.default_rng(seed)
     angle, radius = rng.uniform(-np.pi, np.pi, n), 1.5 * np.sqrt(rng.uniform(0, 1, n))
@@ -27,7 +25,7 @@ def cloud(seed: int, n: int = 60) -> np.ndarray:
     )
 
 
-def within_hull(points: np.ndarray, query: np.ndarray) -> bool:
+def within_hull(points, query):
     """Whether weights exist that mix the points to the query: the definition of a hull."""
     mix = linprog(
         np.zeros(len(points)),
@@ -42,7 +40,7 @@ def within_hull(points: np.ndarray, query: np.ndarray) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_vertices_are_the_points_outside_the_hull_of_the_others(seed: int) -> None:
+def test_vertices_are_the_points_outside_the_hull_of_the_others(seed):
     points = cloud(seed, 30)
     vertices = {tuple(v) for v in hull_vertices(points)}
     for k, point in enumerate(points):
@@ -51,7 +49,7 @@ def test_vertices_are_the_points_outside_the_hull_of_the_others(seed: int) -> No
         )
 
 
-def test_points_inside_and_copies_add_no_vertex() -> None:
+def test_points_inside_and_copies_add_no_vertex():
     rng = np.random.default_rng(0)
     more = np.vstack(
         [CUBE, CUBE, rng.uniform(-0.9, 0.9, (50, 3)) + np.array([0, 0, 1])]
@@ -72,7 +70,7 @@ def test_points_inside_and_copies_add_no_vertex() -> None:
         (np.vstack([[0, 0, np.inf], CUBE]), "must be finite; point 0 is"),
     ],
 )
-def test_points_without_a_hull_are_refused(points: np.ndarray, message: str) -> None:
+def test_points_without_a_hull_are_refused(points, message):
     with pytest.raises(szlib.ZoneError, match=message):
         hull_vertices(points)
     with pytest.raises(szlib.ZoneError, match=message):
@@ -84,9 +82,7 @@ def test_points_without_a_hull_are_refused(points: np.ndarray, message: str) -> 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("speed", [0.7, 1.1])
-def test_a_point_is_in_the_slice_where_it_is_in_the_hull(
-    seed: int, speed: float
-) -> None:
+def test_a_point_is_in_the_slice_where_it_is_in_the_hull(seed, speed):
     points = cloud(seed)
     section = Polygon(slice_hull(points, speed, r_max=R_MAX).polygon)
     rng = np.random.default_rng(seed)
@@ -99,7 +95,7 @@ def test_a_point_is_in_the_slice_where_it_is_in_the_hull(
     assert 0 < inside < 40
 
 
-def test_slice_exists_at_the_speed_of_a_vertex() -> None:
+def test_slice_exists_at_the_speed_of_a_vertex():
     pyramid = np.array(
         [(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (0, 0, 2), (1.5, 0, 1)], float
     )
@@ -110,13 +106,13 @@ def test_slice_exists_at_the_speed_of_a_vertex() -> None:
     assert section.symmetric_difference(expected).area < 1e-12
 
 
-def test_slice_exists_in_the_plane_of_many_vertices() -> None:
+def test_slice_exists_in_the_plane_of_many_vertices():
     """Two boxes on top of each other: every vertex of the middle lies in the slice."""
     stack = np.vstack([CUBE, CUBE + np.array([0, 0, 2])])
     assert Polygon(slice_hull(stack, 2.0, r_max=R_MAX).polygon).area == pytest.approx(4)
 
 
-def test_slices_of_the_vertices_are_slices_of_the_points() -> None:
+def test_slices_of_the_vertices_are_slices_of_the_points():
     points = cloud(5)
     all_points, vertices = (
         slice_hull(p, 1.0, r_max=R_MAX).polygon for p in (points, hull_vertices(points))
@@ -125,7 +121,7 @@ def test_slices_of_the_vertices_are_slices_of_the_points() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_polygons_are_convex_and_counter_clockwise(seed: int) -> None:
+def test_polygons_are_convex_and_counter_clockwise(seed):
     corners = slice_hull(cloud(seed), 1.0, r_max=R_MAX).polygon
     along = np.roll(corners, -1, axis=0) - corners
     following = np.roll(along, -1, axis=0)
@@ -133,7 +129,7 @@ def test_polygons_are_convex_and_counter_clockwise(seed: int) -> None:
 
 
 @pytest.mark.parametrize("speed", [-1.0, 0.0, 2.0, 5.0, np.nan, np.inf])
-def test_a_speed_outside_the_data_names_the_range(speed: float) -> None:
+def test_a_speed_outside_the_data_names_the_range(speed):
     with pytest.raises(
         szlib.ZoneError, match=rf"at {speed:g} m/s .* covers 0.000 to 2.000 m/s"
     ):
@@ -141,7 +137,7 @@ def test_a_speed_outside_the_data_names_the_range(speed: float) -> None:
 
 
 @pytest.mark.parametrize("speed", [1e-300, 1e-15, 1e-9, 2 - 1e-15])
-def test_a_slice_at_the_very_edge_is_whole_or_undefined(speed: float) -> None:
+def test_a_slice_at_the_very_edge_is_whole_or_undefined(speed):
     """A cone's tip has no extent; the box has it to its very end."""
     assert Polygon(slice_hull(CUBE, speed, r_max=R_MAX).polygon).area == pytest.approx(
         4
@@ -159,7 +155,7 @@ def test_a_slice_at_the_very_edge_is_whole_or_undefined(speed: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_boundary_is_the_rest_of_a_ray_through_the_slice(seed: int) -> None:
+def test_boundary_is_the_rest_of_a_ray_through_the_slice(seed):
     section = slice_hull(cloud(seed), 1.0, r_max=R_MAX)
     rim = Polygon(section.polygon).exterior
     theta = np.random.default_rng(seed).uniform(-np.pi, np.pi, 200)
@@ -172,7 +168,7 @@ def test_boundary_is_the_rest_of_a_ray_through_the_slice(seed: int) -> None:
         )
 
 
-def test_shapes_follow_theta() -> None:
+def test_shapes_follow_theta():
     section = slice_hull(cloud(1), 1.0, r_max=R_MAX)
     theta = np.linspace(0, 6, 12).reshape(3, 4)
     assert section.reach(theta).shape == (3, 4)
@@ -185,7 +181,7 @@ def test_shapes_follow_theta() -> None:
     )
 
 
-def test_between_corner_angles_the_boundary_is_that_of_one_edge() -> None:
+def test_between_corner_angles_the_boundary_is_that_of_one_edge():
     """1 / R' is a sum of one cosine and one sine there; so it is smooth, as the ellipse needs it."""
     section = slice_hull(cloud(2), 1.0, r_max=R_MAX)
     angles = section.corner_angles
@@ -201,7 +197,7 @@ def test_between_corner_angles_the_boundary_is_that_of_one_edge() -> None:
 
 
 @pytest.mark.parametrize("r_max", [2.0, 3.0])
-def test_no_sample_is_within_the_zone(r_max: float) -> None:
+def test_no_sample_is_within_the_zone(r_max):
     points = cloud(3)
     section = slice_hull(points, 1.0, r_max=r_max)
     same = np.array(
@@ -215,7 +211,7 @@ def test_no_sample_is_within_the_zone(r_max: float) -> None:
 # --- the origin outside ------------------------------------------------------------------------------
 
 
-def missing_directions(message: str) -> tuple[int, int]:
+def missing_directions(message):
     low, high = re.search(
         r"directions from (-?\d+) counter-clockwise to (-?\d+) deg", message
     ).groups()
@@ -223,7 +219,7 @@ def missing_directions(message: str) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("towards", range(-180, 180, 15))
-def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> None:
+def test_the_missing_directions_are_those_that_miss_the_slice(towards):
     angle = np.radians(towards)
     corners = np.array([(0.2, 0.1), (1.0, -0.3), (1.4, 0.2), (0.9, 0.6)])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -255,9 +251,7 @@ def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> N
         ([(-1, -0.5), (-0.2, 0), (-1, 0.5)], -153, 153),
     ],
 )
-def test_origin_on_or_outside_the_rim_is_undefined(
-    corners: list, low: int, high: int
-) -> None:
+def test_origin_on_or_outside_the_rim_is_undefined(corners, low, high):
     with pytest.raises(szlib.ZoneError) as error:
         Slice(np.array(corners, float), 1.1, R_MAX)
     assert missing_directions(str(error.value)) == (low, high)

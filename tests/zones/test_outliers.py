@@ -1,7 +1,5 @@
 """Outliers: the plane inside out, whole encounters by default, and the paper's quota of samples."""
 
-from __future__ import annotations
-
 import math
 import warnings
 
@@ -28,9 +26,7 @@ from szlib.zones.outliers import (
 )
 
 
-def make_samples(
-    n: int = 1000, *, seed: int = 0, nearest: float = 0.9, farthest: float = 2.5
-) -> pd.DataFrame:
+def make_samples(n=1000, *, seed=0, nearest=0.9, farthest=2.5):
     """People all around, none nearer than `nearest`."""
     rng = np.random.default_rng(seed)
     return pd.DataFrame(
@@ -42,11 +38,11 @@ def make_samples(
     )
 
 
-def close(samples: pd.DataFrame) -> pd.DataFrame:
+def close(samples):
     return samples[samples["distance"] <= 2]
 
 
-def with_intruders(samples: pd.DataFrame, count: int = 5) -> pd.DataFrame:
+def with_intruders(samples, count=5):
     """Add a few people who come far too close."""
     rng = np.random.default_rng(9)
     intruders = pd.DataFrame(
@@ -60,13 +56,13 @@ def with_intruders(samples: pd.DataFrame, count: int = 5) -> pd.DataFrame:
 
 
 def make_encounters(
-    n: int = 600,
+    n=600,
     *,
-    seed: int = 0,
-    edge: float = 0.9,
-    intruders: int = 0,
-    pace: float = 1.5,
-) -> pd.DataFrame:
+    seed=0,
+    edge=0.9,
+    intruders=0,
+    pace=1.5,
+):
     """Straight walks past a person, 31 samples each, none nearer than `edge` but for the first few.
 
     The intruders come as near as 0.2 to 0.4 m, from all sides.
@@ -99,7 +95,7 @@ def make_encounters(
 
 
 @pytest.mark.parametrize("r_max", [2.0, 3.5])
-def test_complementary_plane_is_the_plane_inside_out(r_max: float) -> None:
+def test_complementary_plane_is_the_plane_inside_out(r_max):
     samples = close(make_samples())
     points = complementary_points(samples, r_max=r_max)
     np.testing.assert_allclose(
@@ -112,7 +108,7 @@ def test_complementary_plane_is_the_plane_inside_out(r_max: float) -> None:
     )
 
 
-def test_r_max_maps_to_the_origin_and_contact_to_the_rim() -> None:
+def test_r_max_maps_to_the_origin_and_contact_to_the_rim():
     samples = pd.DataFrame(
         {"los_angle": [1.0, np.pi / 2, np.pi], "distance": [2.0, 0.0, 0.5]}
     )
@@ -130,7 +126,7 @@ def test_r_max_maps_to_the_origin_and_contact_to_the_rim() -> None:
         {"los_angle": np.inf},
     ],
 )
-def test_samples_without_a_complement_are_refused(change: dict[str, float]) -> None:
+def test_samples_without_a_complement_are_refused(change):
     samples = close(make_samples()).assign()
     row = samples.index[7]
     for name, value in change.items():
@@ -145,7 +141,7 @@ def test_samples_without_a_complement_are_refused(change: dict[str, float]) -> N
 # --- whole encounters -------------------------------------------------------------------------------
 
 
-def removed_encounters(samples: pd.DataFrame, **options: object) -> set[int]:
+def removed_encounters(samples, **options):
     """Those that lost a sample within 2 m: all of them, or the test fails."""
     near = close(samples)
     outlier = is_outlier(near, **options)
@@ -154,7 +150,7 @@ def removed_encounters(samples: pd.DataFrame, **options: object) -> set[int]:
     return set(lost)
 
 
-def brute_force_factors(points: np.ndarray, k: int) -> np.ndarray:
+def brute_force_factors(points, k):
     """The local outlier factor as Breunig et al. define it, pair by pair."""
     distance = np.linalg.norm(points[:, None] - points, axis=-1)
     np.fill_diagonal(distance, np.inf)
@@ -168,7 +164,7 @@ def brute_force_factors(points: np.ndarray, k: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("k", [5, 20, 60])
-def test_factor_equals_its_definition(k: int) -> None:
+def test_factor_equals_its_definition(k):
     points = complementary_points(
         nearest_approaches(close(make_encounters(300, intruders=5)))
     )
@@ -177,7 +173,7 @@ def test_factor_equals_its_definition(k: int) -> None:
     )
 
 
-def test_nearest_approach_is_the_nearest_sample_of_an_encounter() -> None:
+def test_nearest_approach_is_the_nearest_sample_of_an_encounter():
     samples = close(make_encounters()).sample(frac=1, random_state=0)
     nearest = nearest_approaches(samples)
     expected = samples.loc[samples.groupby("encounter")["distance"].idxmin()]
@@ -187,15 +183,13 @@ def test_nearest_approach_is_the_nearest_sample_of_an_encounter() -> None:
 @pytest.mark.parametrize("pace", [0.2, 3.0])
 @pytest.mark.parametrize("intruders", [0, 1, 6, 12, 30])
 @pytest.mark.parametrize("seed", range(3))
-def test_intruders_are_found_whatever_their_number_and_pace(
-    seed: int, intruders: int, pace: float
-) -> None:
+def test_intruders_are_found_whatever_their_number_and_pace(seed, intruders, pace):
     """Up to 5 % of the encounters; no other encounter is removed."""
     samples = make_encounters(seed=seed, intruders=intruders, pace=pace)
     assert removed_encounters(samples) == set(range(intruders))
 
 
-def test_fixed_share_misses_slow_intruders() -> None:
+def test_fixed_share_misses_slow_intruders():
     samples = make_encounters(intruders=6, pace=0.2)
     near = close(samples)
     # the very number, were they known
@@ -204,7 +198,7 @@ def test_fixed_share_misses_slow_intruders() -> None:
     assert is_outlier(near)[near["encounter"] < 6].all()
 
 
-def test_middle_of_a_crowd_is_found_in_a_later_round() -> None:
+def test_middle_of_a_crowd_is_found_in_a_later_round():
     """A hundred who rest upon each other in two places, of 2,000: one round alone sees their fringe."""
     samples = make_encounters(2000, intruders=100)
     samples.loc[samples["encounter"] < 100, "los_angle"] *= 0.25
@@ -216,7 +210,7 @@ def test_middle_of_a_crowd_is_found_in_a_later_round() -> None:
     assert set(range(100)) <= removed_encounters(samples)
 
 
-def test_distant_encounters_are_no_outliers() -> None:
+def test_distant_encounters_are_no_outliers():
     ring = make_samples(300, nearest=0.9, farthest=1.1)
     two = pd.DataFrame({"los_angle": [1.0, 1.0], "distance": [0.2, 1.95], "speed": 1.0})
     samples = pd.concat([ring, two], ignore_index=True).assign(encounter=range(302))
@@ -226,16 +220,14 @@ def test_distant_encounters_are_no_outliers() -> None:
 
 
 @pytest.mark.parametrize(("factor", "is_removed"), [(1.9, False), (2.1, True)])
-def test_an_encounter_is_an_outlier_above_a_factor_of_two(
-    factor: float, is_removed: bool
-) -> None:
+def test_an_encounter_is_an_outlier_above_a_factor_of_two(factor, is_removed):
     ring = make_samples(300, nearest=0.9, farthest=1.1)
 
-    def with_one_at(distance: float) -> pd.DataFrame:
+    def with_one_at(distance):
         one = pd.DataFrame({"los_angle": [1.0], "distance": [distance], "speed": 1.0})
         return pd.concat([ring, one], ignore_index=True).assign(encounter=range(301))
 
-    def factor_at(distance: float) -> float:
+    def factor_at(distance):
         return local_outlier_factors(
             complementary_points(with_one_at(distance)), N_NEIGHBOURS
         )[-1]
@@ -244,7 +236,7 @@ def test_an_encounter_is_an_outlier_above_a_factor_of_two(
     assert removed_encounters(with_one_at(distance)) == ({300} if is_removed else set())
 
 
-def test_number_of_neighbours_is_a_share_of_the_encounters() -> None:
+def test_number_of_neighbours_is_a_share_of_the_encounters():
     samples = make_encounters(2000, intruders=40)
     expected = math.ceil(NEIGHBOUR_SHARE * samples["encounter"].nunique())
     assert expected > N_NEIGHBOURS
@@ -255,7 +247,7 @@ def test_number_of_neighbours_is_a_share_of_the_encounters() -> None:
     assert removed_encounters(few) == removed_encounters(few, n_neighbours=N_NEIGHBOURS)
 
 
-def test_numbers_order_and_direction_of_encounters_change_nothing() -> None:
+def test_numbers_order_and_direction_of_encounters_change_nothing():
     samples = make_encounters(intruders=9)
     kept = remove_outliers(samples)
     assert len(kept) < len(close(samples))
@@ -274,7 +266,7 @@ def test_numbers_order_and_direction_of_encounters_change_nothing() -> None:
     assert mirrored.index.equals(kept.index)
 
 
-def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
+def test_the_funnel_counts_the_samples_of_outlying_encounters():
     samples = make_encounters(intruders=4)
     kept = remove_outliers(samples)
     *_, inliers = funnels.get(kept)
@@ -283,7 +275,7 @@ def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
     pd.testing.assert_frame_equal(kept, samples.loc[kept.index])
 
 
-def test_few_encounters_warn_and_stay() -> None:
+def test_few_encounters_warn_and_stay():
     few = make_encounters(N_NEIGHBOURS, intruders=1)
     with pytest.warns(
         szlib.DataWarning,
@@ -294,7 +286,7 @@ def test_few_encounters_warn_and_stay() -> None:
     remove_outliers(few, n_neighbours=5)  # asked for, so without a warning
 
 
-def test_copies_of_an_encounter_count_once() -> None:
+def test_copies_of_an_encounter_count_once():
     """Or a denser place than any other would make outliers of all around it."""
     samples = make_encounters(intruders=5)
     copies = pd.concat(
@@ -307,7 +299,7 @@ def test_copies_of_an_encounter_count_once() -> None:
     assert removed_encounters(both) == removed_encounters(samples) >= set(range(5))
 
 
-def test_encounters_of_different_days_are_separate() -> None:
+def test_encounters_of_different_days_are_separate():
     """Otherwise, an intruder would remove the encounter with the same number on another day."""
     days = [
         make_encounters(seed=k, intruders=6 * k).assign(day=f"2012-11-0{k + 1}")
@@ -320,7 +312,7 @@ def test_encounters_of_different_days_are_separate() -> None:
     assert set(found["encounter"]) == set(range(6))
 
 
-def test_samples_without_encounter_count_individually() -> None:
+def test_samples_without_encounter_count_individually():
     samples = with_intruders(close(make_samples(2500)))
     found = is_outlier(samples)
     assert np.flatnonzero(found).tolist() == list(range(len(samples) - 5, len(samples)))
@@ -329,7 +321,7 @@ def test_samples_without_encounter_count_individually() -> None:
     )
 
 
-def test_too_many_neighbours_are_refused() -> None:
+def test_too_many_neighbours_are_refused():
     with pytest.raises(
         szlib.DataError,
         match=r"smaller than the number of samples \(or encounters\) .* got 600 neigh",
@@ -337,7 +329,7 @@ def test_too_many_neighbours_are_refused() -> None:
         remove_outliers(make_encounters(), n_neighbours=600)
 
 
-def test_real_day_has_no_outliers(real_samples: pd.DataFrame) -> None:
+def test_real_day_has_no_outliers(real_samples):
     """169 encounters within 2 m say too little: even the nearest, at 0.48 m, has company."""
     assert len(remove_outliers(real_samples)) == (real_samples["distance"] <= 2).sum()
 
@@ -347,7 +339,7 @@ def test_real_day_has_no_outliers(real_samples: pd.DataFrame) -> None:
 
 @pytest.mark.parametrize("neighbours", [5, 20])
 @pytest.mark.parametrize("fraction", [0.002, 0.05])
-def test_outliers_equal_scikit_learn(fraction: float, neighbours: int) -> None:
+def test_outliers_equal_scikit_learn(fraction, neighbours):
     samples = close(make_samples())
     radius, angle = 2 - samples["distance"], samples["los_angle"]
     features = [radius * np.cos(angle), radius * np.sin(angle)]
@@ -358,7 +350,7 @@ def test_outliers_equal_scikit_learn(fraction: float, neighbours: int) -> None:
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.002, 0.01, 0.1, 0.5])
-def test_fixed_share_is_removed(fraction: float) -> None:
+def test_fixed_share_is_removed(fraction):
     samples = make_samples()
     n = len(close(samples))
     kept = remove_outliers(samples, fraction=fraction)
@@ -367,14 +359,14 @@ def test_fixed_share_is_removed(fraction: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_planted_intruders_are_found(seed: int) -> None:
+def test_planted_intruders_are_found(seed):
     people = close(make_samples(2500, seed=seed))
     samples = with_intruders(people)
     found = is_outlier(samples, fraction=5 / len(samples))
     assert np.flatnonzero(found).tolist() == list(range(len(people), len(samples)))
 
 
-def test_row_order_and_rotation_change_nothing() -> None:
+def test_row_order_and_rotation_change_nothing():
     samples = with_intruders(make_samples())
     kept = remove_outliers(samples, fraction=0.01)
     shuffled = remove_outliers(samples.sample(frac=1, random_state=1), fraction=0.01)
@@ -385,7 +377,7 @@ def test_row_order_and_rotation_change_nothing() -> None:
     assert turned.index.equals(kept.index)
 
 
-def test_rows_and_input_do_not_change() -> None:
+def test_rows_and_input_do_not_change():
     samples = make_samples().assign(note="x")
     funnels.attach(samples, [funnels.stage("before", 1000, 1000, {})])
     before = samples.copy(deep=True)
@@ -400,7 +392,7 @@ def test_rows_and_input_do_not_change() -> None:
     assert len(funnels.get(samples)) == 1
 
 
-def test_identical_samples_warn_and_are_separated() -> None:
+def test_identical_samples_warn_and_are_separated():
     samples = pd.concat(
         [close(make_samples(600)), close(make_samples(30))]
         + [close(make_samples(30)).head(1)] * 40
@@ -417,7 +409,7 @@ def test_identical_samples_warn_and_are_separated() -> None:
     assert JITTER < 0.01
 
 
-def test_a_few_identical_samples_need_no_noise() -> None:
+def test_a_few_identical_samples_need_no_noise():
     samples = close(make_samples())
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -451,12 +443,12 @@ def test_a_few_identical_samples_need_no_noise() -> None:
         ),
     ],
 )
-def test_invalid_parameters_are_refused(options: dict, message: str) -> None:
+def test_invalid_parameters_are_refused(options, message):
     with pytest.raises(szlib.DataError, match=message):
         remove_outliers(make_samples(), **{"fraction": FRACTION, **options})
 
 
-def test_invalid_samples_are_refused() -> None:
+def test_invalid_samples_are_refused():
     samples = make_samples()
     with pytest.raises(szlib.DataError, match=r"columns \['distance'\] are missing"):
         remove_outliers(samples.drop(columns="distance"))
@@ -470,13 +462,13 @@ def test_invalid_samples_are_refused() -> None:
         )
 
 
-def test_fixed_share_is_removed_from_the_real_day(real_samples: pd.DataFrame) -> None:
+def test_fixed_share_is_removed_from_the_real_day(real_samples):
     kept = remove_outliers(real_samples, fraction=FRACTION)
     *_, near, inliers = funnels.get(kept)
     assert inliers["rejected"]["outlier (LOF)"] == math.ceil(0.002 * (near["kept"] - 1))
 
 
-def test_encounters_are_numbered_in_order_of_appearance() -> None:
+def test_encounters_are_numbered_in_order_of_appearance():
     table = pd.DataFrame({"encounter": [5, 5, 2, 5], "day": ["a", "a", "a", "b"]})
     number, first = encounter_numbers(table)
     assert number.tolist() == [0, 0, 1, 2]

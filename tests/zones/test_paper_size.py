@@ -3,8 +3,6 @@
 The paper's full size (half a million samples) runs in `make bench`.
 """
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 
 import numpy as np
@@ -19,7 +17,7 @@ from szlib.zones import outliers
 MANY = 20_000
 
 
-def test_outliers_are_those_of_scikit_learn() -> None:
+def test_outliers_are_those_of_scikit_learn():
     samples = paper_samples(MANY)
     points = outliers.complementary_points(samples)
     expected = (
@@ -32,9 +30,7 @@ def test_outliers_are_those_of_scikit_learn() -> None:
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 @pytest.mark.parametrize("fraction", [None, 0.002])
-def test_many_copies_do_not_make_lof_explode(
-    share: float, fraction: float | None
-) -> None:
+def test_many_copies_do_not_make_lof_explode(share, fraction):
     """As a person who stands still for hours would give; their copies are no outliers, nor make others so."""
     samples = paper_samples(MANY)
     copies = np.arange(MANY) < share * MANY
@@ -59,8 +55,8 @@ def test_many_copies_do_not_make_lof_explode(
 
 @pytest.mark.parametrize("fraction", [None, 0.002])
 def test_the_zone_does_not_depend_on_the_order_of_samples(
-    fraction: float | None,
-) -> None:
+    fraction,
+):
     samples = paper_samples(MANY)
     shuffled = samples.sample(frac=1, random_state=1)
     options = {"speeds": (0.9, 1.1), "fraction": fraction}

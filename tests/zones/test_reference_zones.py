@@ -12,7 +12,7 @@ ENTRIES = json.loads(FILE.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("name", ENTRIES)
-def test_each_zone_can_be_kept_by_a_robot_and_says_what_it_rests_on(name: str) -> None:
+def test_each_zone_can_be_kept_by_a_robot_and_says_what_it_rests_on(name):
     zone = szlib.reference_zone(name)
     a, b = zone.ellipse.semi_axes
     assert 0.2 < b <= a < 2.0
@@ -33,12 +33,12 @@ def test_each_zone_can_be_kept_by_a_robot_and_says_what_it_rests_on(name: str) -
     assert step.safe
 
 
-def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
+def test_an_unknown_name_is_refused_with_those_that_exist():
     with pytest.raises(
         szlib.ZoneError, match=r"name must be one of atc-strangers, .*; got 'atc'"
     ):
         szlib.reference_zone("atc")
 
 
-def test_the_file_is_small() -> None:
+def test_the_file_is_small():
     assert FILE.stat().st_size < 8_000

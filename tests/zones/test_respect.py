@@ -1,9 +1,6 @@
 """The respect zone: an imposed zone is found, whoever is the reference; null data has none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -22,13 +19,11 @@ from szlib.zones.uncertainty import estimate_uncertainty
 ZONE = szlib.Ellipse((0.1, 0.0), (0.95, 0.7))
 
 
-def prepare(samples: pd.DataFrame, null: szlib.NullEncounters) -> RespectEstimator:
+def prepare(samples, null):
     return RespectEstimator.from_samples(samples, r_max=R_MAX, null=null)
 
 
-def fitted(
-    samples: pd.DataFrame, null: szlib.NullEncounters, speed: float = 1.1
-) -> np.ndarray:
+def fitted(samples, null, speed=1.1):
     """Centre, semi-axes and angle."""
     return respect_likelihood.zone_ellipses(
         prepare(samples, null).middle[None], [speed]
@@ -36,26 +31,26 @@ def fitted(
 
 
 @pytest.fixture(scope="module")
-def null() -> szlib.NullEncounters:
+def null():
     return null_of(passing_pairs(3500, 0))
 
 
 @pytest.fixture(scope="module")
-def large_null() -> szlib.NullEncounters:
+def large_null():
     return null_of(passing_pairs(8000, 0))
 
 
 @pytest.fixture(scope="module")
-def data() -> pd.DataFrame:
+def data():
     return respecting(passing_pairs(1500, 1), ZONE, careless=0.05)
 
 
 @pytest.fixture(scope="module")
-def estimator(data: pd.DataFrame, null: szlib.NullEncounters) -> RespectEstimator:
+def estimator(data, null):
     return prepare(data, null)
 
 
-def random_parameters(seed: int) -> np.ndarray:
+def random_parameters(seed):
     return np.random.default_rng(seed).uniform(
         0.7 * respect_likelihood._LOW, 0.7 * respect_likelihood._HIGH
     )
@@ -65,7 +60,7 @@ def random_parameters(seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", [3, 5])
-def test_every_pair_on_the_plaza_gives_its_zone(seed: int, tmp_path: Path) -> None:
+def test_every_pair_on_the_plaza_gives_its_zone(seed, tmp_path):
     """Nearly all of its people pass just outside of a zone, where chance has hardly anybody."""
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=seed))
     against = szlib.null_pairs(tracks, shifts=19, progress=False)
@@ -83,9 +78,7 @@ def test_every_pair_on_the_plaza_gives_its_zone(seed: int, tmp_path: Path) -> No
         (szlib.Ellipse((0, 0), (0.5, 0.5)), 0.05),
     ],
 )
-def test_an_imposed_zone_is_found(
-    zone: szlib.Ellipse, careless: float, large_null: szlib.NullEncounters
-) -> None:
+def test_an_imposed_zone_is_found(zone, careless, large_null):
     """How far it reaches ahead and behind is known less well: few straight paths touch it there."""
     m, n, a, b, _ = fitted(
         respecting(passing_pairs(4000, 5), zone, careless), large_null
@@ -95,8 +88,8 @@ def test_an_imposed_zone_is_found(
 
 
 def test_the_zone_grows_with_speed_if_people_do_so(
-    large_null: szlib.NullEncounters,
-) -> None:
+    large_null,
+):
     samples = passing_pairs(4000, 7)
     larger = 0.4 + 0.4 * samples[["speed", "other_speed"]].max(axis=1)
     of_all, of_fast = (
@@ -111,9 +104,7 @@ def test_the_zone_grows_with_speed_if_people_do_so(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_people_who_ignore_each_other_have_no_zone(
-    seed: int, null: szlib.NullEncounters
-) -> None:
+def test_people_who_ignore_each_other_have_no_zone(seed, null):
     with pytest.raises(
         szlib.ZoneError, match=r"no respect zone: .* explain the data nearly as well"
     ):
@@ -123,9 +114,7 @@ def test_people_who_ignore_each_other_have_no_zone(
 # --- invariances -------------------------------------------------------------------------------------
 
 
-def test_it_does_not_matter_who_is_the_reference(
-    data: pd.DataFrame, null: szlib.NullEncounters, estimator: RespectEstimator
-) -> None:
+def test_it_does_not_matter_who_is_the_reference(data, null, estimator):
     half = data["encounter"] % 2 == 0
     mixed = pd.concat([exchanged(data[half]), data[~half]])
     exchange = prepare(mixed, null)
@@ -135,10 +124,8 @@ def test_it_does_not_matter_who_is_the_reference(
         assert found.cost(p)[0] == pytest.approx(expected.cost(p)[0], rel=1e-9)
 
 
-def test_a_mirror_image_has_the_mirrored_zone(
-    data: pd.DataFrame, null: szlib.NullEncounters, estimator: RespectEstimator
-) -> None:
-    def mirror(samples: pd.DataFrame) -> pd.DataFrame:
+def test_a_mirror_image_has_the_mirrored_zone(data, null, estimator):
+    def mirror(samples):
         return samples.assign(
             **{name: -samples[name] for name in ("los_angle", "other_los_angle")}
         )
@@ -148,9 +135,7 @@ def test_a_mirror_image_has_the_mirrored_zone(
     assert found == pytest.approx(expected * [1, -1, 1, 1, -1], abs=0.02)
 
 
-def test_the_order_of_rows_does_not_matter(
-    data: pd.DataFrame, null: szlib.NullEncounters, estimator: RespectEstimator
-) -> None:
+def test_the_order_of_rows_does_not_matter(data, null, estimator):
     found = prepare(data.sample(frac=1, random_state=0), null).likelihood
     for seed in range(20):
         p = random_parameters(seed)
@@ -158,9 +143,7 @@ def test_the_order_of_rows_does_not_matter(
         assert found.cost(p)[0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_other_kinds_do_not_count(
-    data: pd.DataFrame, null: szlib.NullEncounters, estimator: RespectEstimator
-) -> None:
+def test_other_kinds_do_not_count(data, null, estimator):
     companions = respecting(
         passing_pairs(200, 9), szlib.Ellipse((0.0, 0.0), (1.5, 1.5))
     )
@@ -176,7 +159,7 @@ def test_other_kinds_do_not_count(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_distances_are_those_of_a_loop_over_all_samples(seed: int) -> None:
+def test_distances_are_those_of_a_loop_over_all_samples(seed):
     # without times, paths are not smoothed
     samples = passing_pairs(60, seed).drop(columns="t")
     p = random_parameters(seed)
@@ -209,19 +192,17 @@ def test_distances_are_those_of_a_loop_over_all_samples(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_gradient_is_that_of_finite_differences(
-    seed: int, estimator: RespectEstimator
-) -> None:
+def test_the_gradient_is_that_of_finite_differences(seed, estimator):
     likelihood = estimator.likelihood
     p = random_parameters(seed)
     expected = approx_fprime(p, lambda q: likelihood.cost(q)[0], 1e-7)
     assert likelihood.cost(p)[1] == pytest.approx(expected, abs=2e-2, rel=1e-3)
 
 
-def log_odds_regression(g: np.ndarray, g_null: np.ndarray) -> float:
+def log_odds_regression(g, g_null):
     """The best log likelihood of a logistic regression that tells data from null model by log g."""
 
-    def cost(intercept: float) -> float:
+    def cost(intercept):
         odds = intercept + np.log(g), -intercept - np.log(g_null)
         return float(sum(np.logaddexp(0, -each).sum() for each in odds))
 
@@ -229,13 +210,13 @@ def log_odds_regression(g: np.ndarray, g_null: np.ndarray) -> float:
 
 
 def test_the_likelihood_is_that_of_a_logistic_regression(
-    estimator: RespectEstimator,
-) -> None:
+    estimator,
+):
     p = random_parameters(8)
     f, (w, excess, reach), total = expit(p[8]), np.exp(p[9:]), 0.0
     h, h_null = (each.distances(p) for each in (estimator.data, estimator.null))
 
-    def g(h: np.ndarray) -> np.ndarray:
+    def g(h):
         near = 1 + excess * np.exp(-np.maximum(h, 0) / reach)
         return f + (1 - f) * near / (1 + np.exp(-h / w))
 
@@ -250,7 +231,7 @@ def test_the_likelihood_is_that_of_a_logistic_regression(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_mean_of_g_is_that_of_both_samples(seed: int) -> None:
+def test_the_mean_of_g_is_that_of_both_samples(seed):
     """Also where hardly anybody of the null model is near, and many of the data."""
     rng = np.random.default_rng(seed)
     g, g_null = np.exp(rng.normal(seed, 1, 500)), np.full(4000, 0.002)
@@ -266,13 +247,13 @@ def test_the_mean_of_g_is_that_of_both_samples(seed: int) -> None:
 
 
 def test_the_posterior_has_the_curvature_of_its_density(
-    estimator: RespectEstimator,
-) -> None:
+    estimator,
+):
     """Of well determined parameters the standard deviation is that of the Gaussian with this curvature."""
     likelihood = estimator.likelihood
     names, step, draws = [3, 5], 0.02, estimator.draws.values
 
-    def value(q: np.ndarray) -> float:
+    def value(q):
         p = draws.mean(axis=0)
         p[names] += q
         return likelihood.log_posterior(p)
@@ -285,7 +266,7 @@ def test_the_posterior_has_the_curvature_of_its_density(
     assert 0.8 * of_b < drawn < 2.5 * of_b, "the other parameters widen it"
 
 
-def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> None:
+def test_intervals_are_those_of_the_posterior(estimator):
     ellipses = estimator.fit_shape([0.9, 1.1]).ellipses
     found = estimate_uncertainty(estimator, ellipses, n_resamples=300, seed=0)
     assert found.description.startswith("posterior: ")
@@ -304,8 +285,8 @@ def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> No
 
 @pytest.mark.parametrize("across", [-0.02, 0.02])
 def test_the_intervals_of_a_round_zone_are_not_those_of_its_longer_and_shorter_axis(
-    estimator: RespectEstimator, across: float
-) -> None:
+    estimator, across
+):
     """Whichever axis is longer in a draw, the semi-axes of a circle are alike."""
     rng, best = np.random.default_rng(0), np.zeros(12)
     best[[3, 5]] = np.log(0.8), np.log(0.8) + across
@@ -321,8 +302,8 @@ def test_the_intervals_of_a_round_zone_are_not_those_of_its_longer_and_shorter_a
 
 
 def test_the_posterior_is_never_surer_than_the_model_is_right(
-    estimator: RespectEstimator,
-) -> None:
+    estimator,
+):
     draws = estimator.draws
     angles = respect_likelihood.zone_ellipses(draws.values, [1.1])[:, 0, 4]
     draws = replace(draws, values=draws.values[np.abs(angles) < np.pi / 4])
@@ -347,9 +328,9 @@ def test_the_posterior_is_never_surer_than_the_model_is_right(
 
 @pytest.mark.filterwarnings("ignore:at 1.1 m/s fewer than 20")
 def test_the_default_is_the_paper_s_where_the_null_model_is_small_or_shows_no_respect(
-    data: pd.DataFrame, null: szlib.NullEncounters
-) -> None:
-    def method(samples: pd.DataFrame, model: szlib.NullEncounters | None) -> str:
+    data, null
+):
+    def method(samples, model):
         return szlib.SocialZone.fit(
             samples, null=model, speeds=(1.1,), n_resamples=0
         ).method
@@ -363,9 +344,7 @@ def test_the_default_is_the_paper_s_where_the_null_model_is_small_or_shows_no_re
     assert method(data[data["encounter"] < 200], null) == "paper"
 
 
-def test_a_zone_that_does_not_contain_its_person_is_no_default(
-    data: pd.DataFrame, null: szlib.NullEncounters, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_zone_that_does_not_contain_its_person_is_no_default(data, null, monkeypatch):
     shifted = np.zeros(12)
     shifted[[0, 3, 5]] = 0.5, np.log(0.4), np.log(0.4)
     monkeypatch.setattr(RespectEstimator, "middle", shifted)
@@ -379,9 +358,7 @@ def test_a_zone_that_does_not_contain_its_person_is_no_default(
     )
 
 
-def test_what_cannot_be_compared_is_refused(
-    data: pd.DataFrame, null: szlib.NullEncounters
-) -> None:
+def test_what_cannot_be_compared_is_refused(data, null):
     with pytest.raises(
         szlib.ZoneError, match=r"needs a null model; pass null=szlib\.null_encounters"
     ):
@@ -411,8 +388,8 @@ def test_what_cannot_be_compared_is_refused(
 
 
 def test_a_person_who_stands_or_has_no_velocity_carries_no_ellipse(
-    data: pd.DataFrame,
-) -> None:
+    data,
+):
     few = data[data["encounter"] < 200]
     unknown = few.assign(other_speed=np.nan, other_los_angle=np.nan)
     standing = PairPaths.from_samples(few.assign(other_speed=0.2))

@@ -1,9 +1,5 @@
 """Is it respect at all: valid p-values under the null, small ones with respect."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,7 +13,7 @@ KINDS = ("opposite", "crossing")
 SHIFTS = 39
 
 
-def encounters(seed: int, *shifts: int, n: int = 40, away: float = 0.0) -> pd.DataFrame:
+def encounters(seed, *shifts, n=40, away=0.0):
     """`n` single samples of each shift, their nearest approach even between `away` and 3 m."""
     draws = [
         np.random.default_rng([seed, k]).uniform([[-3], [away]], 3, (2, n))
@@ -34,7 +30,7 @@ def encounters(seed: int, *shifts: int, n: int = 40, away: float = 0.0) -> pd.Da
     return table.assign(los_angle=angle, distance=distance, speed=1.0)
 
 
-def null_of(seed: int, shifts: int = SHIFTS) -> szlib.NullEncounters:
+def null_of(seed, shifts=SHIFTS):
     rows = encounters(seed, *range(shifts))
     found = rows[["shift", "encounter"]].assign(nearest=rows["distance"])
     return szlib.NullEncounters(rows[rows["distance"] <= 2], found, shifts, 2.0)
@@ -43,7 +39,7 @@ def null_of(seed: int, shifts: int = SHIFTS) -> szlib.NullEncounters:
 # --- under the null ------------------------------------------------------------------------------------
 
 
-def test_p_values_are_uniform_under_the_null() -> None:
+def test_p_values_are_uniform_under_the_null():
     tests = [null_test(encounters(seed, SHIFTS), null_of(seed)) for seed in range(100)]
     p = np.array([test.p_value for test in tests])
     assert (p <= 0.05).mean() <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / len(p))
@@ -51,7 +47,7 @@ def test_p_values_are_uniform_under_the_null() -> None:
     assert share == pytest.approx([0.25, 0.5, 0.75], abs=0.1)
 
 
-def test_noninteracting_crowd_shows_no_respect() -> None:
+def test_noninteracting_crowd_shows_no_respect():
     """notebooks/tables/06_nobody.csv has 100 seeds."""
     p = []
     for seed in range(6):
@@ -62,10 +58,10 @@ def test_noninteracting_crowd_shows_no_respect() -> None:
     assert np.median(p) > 0.15
 
 
-def test_different_mix_of_kinds_is_no_respect() -> None:
+def test_different_mix_of_kinds_is_no_respect():
     """In a bunch most walk the same way, and farther apart by condition 3; shifted, most of them cross."""
 
-    def mixed(seed: int, shift: int, crossing: float) -> pd.DataFrame:
+    def mixed(seed, shift, crossing):
         """Encounters of two kinds, a share of them crossing, which come nearer."""
         table = encounters(seed, shift)
         cross = (
@@ -92,7 +88,7 @@ def test_different_mix_of_kinds_is_no_respect() -> None:
     assert np.median(by_kind) > 0.3
 
 
-def test_attraction_is_no_respect(tmp_path: Path) -> None:
+def test_attraction_is_no_respect(tmp_path):
     """A plaza without clearance whose zones are tiny: everybody walks right at everybody.
 
     The radius is at most that of these zones.
@@ -119,7 +115,7 @@ def test_attraction_is_no_respect(tmp_path: Path) -> None:
 # --- people mind -------------------------------------------------------------------------------------
 
 
-def test_people_who_keep_away_show_respect() -> None:
+def test_people_who_keep_away_show_respect():
     null = null_of(0)
     test = null_test(encounters(1, SHIFTS, away=0.5), null)
     assert test.p_value == 1 / (1 + SHIFTS)
@@ -129,13 +125,13 @@ def test_people_who_keep_away_show_respect() -> None:
     assert "people avoid each other (p = 0.025, 39 shifts" in str(test)
 
 
-def test_people_who_come_near_show_no_respect() -> None:
+def test_people_who_come_near_show_no_respect():
     near = encounters(1, SHIFTS)
     near["distance"] /= 3
     assert null_test(near, null_of(0)).p_value == 1
 
 
-def test_excluded_encounters_do_not_count() -> None:
+def test_excluded_encounters_do_not_count():
     """0.5 m that no two bodies can be within: no respect in that alone."""
     null = null_of(0)
     assert null_test(encounters(1, SHIFTS, n=200, away=0.5), null).is_significant
@@ -147,9 +143,7 @@ def test_excluded_encounters_do_not_count() -> None:
     ).is_significant
 
 
-def test_real_day_shows_respect(
-    real_tracks: pd.DataFrame, real_samples: pd.DataFrame
-) -> None:
+def test_real_day_shows_respect(real_tracks, real_samples):
     null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
     for kinds in ("strangers", KINDS):
         data, model = szlib.of_kind(real_samples, kinds), null.of_kind(kinds)
@@ -161,7 +155,7 @@ def test_real_day_shows_respect(
 # --- the object, and errors --------------------------------------------------------------------------
 
 
-def test_kind_on_one_side_only_warns() -> None:
+def test_kind_on_one_side_only_warns():
     null, data = null_of(0), encounters(1, SHIFTS, n=100)
     kind = np.where(np.arange(len(null.encounters)) % 2, "crossing", "opposite")
     null = szlib.NullEncounters(
@@ -180,7 +174,7 @@ def test_kind_on_one_side_only_warns() -> None:
         null_test(data.assign(kind=mixed), null)
 
 
-def test_null_test_without_encounters_is_refused() -> None:
+def test_null_test_without_encounters_is_refused():
     data, null = encounters(1, SHIFTS), null_of(0)
     with pytest.raises(ZoneError, match="nothing to test"):
         null_test(data.assign(distance=2.5), null)

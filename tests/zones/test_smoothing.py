@@ -1,7 +1,5 @@
 """Smoothed paths: straight and curved ones stay, gaps and other encounters do not matter, noise is less."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,11 +9,11 @@ from szlib.zones.respect_likelihood import smooth_paths
 
 
 @pytest.fixture(scope="module")
-def samples() -> pd.DataFrame:
+def samples():
     return passers(10)
 
 
-def test_smoothing_keeps_straight_and_evenly_curved_paths() -> None:
+def test_smoothing_keeps_straight_and_evenly_curved_paths():
     t = np.arange(31) / 10
     x, y = 3 - 1.5 * t + 0.2 * t**2, 0.7 + 0.1 * t - 0.05 * t**2
     path = pd.DataFrame(
@@ -31,7 +29,7 @@ def test_smoothing_keeps_straight_and_evenly_curved_paths() -> None:
     np.testing.assert_allclose(distance, path["distance"], atol=1e-12)
 
 
-def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) -> None:
+def test_smoothing_stops_at_gaps_and_at_other_encounters(samples):
     some = samples[samples["encounter"] < 3].reset_index(drop=True)
     gap = some[(some["encounter"] != 1) | ((some["t"] - 10).abs() > 0.25)]
     together = smooth_paths(gap)
@@ -48,14 +46,14 @@ def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) 
     np.testing.assert_array_equal(untimed[1], some["distance"])
 
 
-def test_smoothing_treats_past_and_future_alike() -> None:
+def test_smoothing_treats_past_and_future_alike():
     path = passers(1, noise=0.05)
     back = path.assign(t=-path["t"].to_numpy())
     for forward, backward in zip(smooth_paths(path), smooth_paths(back), strict=True):
         np.testing.assert_allclose(forward, backward, atol=1e-12)
 
 
-def test_smoothing_reduces_noise() -> None:
+def test_smoothing_reduces_noise():
     still, noisy = passers(200), passers(200, noise=0.05)
     error = smooth_paths(noisy)[1] - still["distance"]
     assert error.std() < 0.6 * (noisy["distance"] - still["distance"]).std()

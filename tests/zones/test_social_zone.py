@@ -1,13 +1,9 @@
 """Social zones: a known one is recovered, files keep every bit, and what is undefined is message."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -32,7 +28,7 @@ KNOWN = {
 }
 
 
-def distance_to(ellipse: szlib.Ellipse, angles: np.ndarray) -> np.ndarray:
+def distance_to(ellipse, angles):
     """From the origin, inside the ellipse, to the ellipse in directions `angles`: a quadratic equation."""
     cos, sin = np.cos(ellipse.angle), np.sin(ellipse.angle)
     turn = np.array([[cos, sin], [-sin, cos]]) / np.reshape(ellipse.semi_axes, (2, 1))
@@ -44,9 +40,7 @@ def distance_to(ellipse: szlib.Ellipse, angles: np.ndarray) -> np.ndarray:
     return (-b + np.sqrt(b * b - a * c)) / a
 
 
-def people_around(
-    rim: Callable[[float], np.ndarray], *, speeds: tuple[float, ...] = STEPS
-) -> pd.DataFrame:
+def people_around(rim, *, speeds=STEPS):
     """People at just the given distances, all around and at every speed, and others farther away."""
     tables = [
         pd.DataFrame(
@@ -62,20 +56,18 @@ def people_around(
     return pd.concat(tables, ignore_index=True).rename_axis("encounter").reset_index()
 
 
-def fit(samples: pd.DataFrame, **options: object) -> SocialZone:
+def fit(samples, **options):
     """The zone without intervals, which take their time."""
     return SocialZone.fit(samples, **{"n_resamples": 0, "method": "hull", **options})
 
 
-def fit_around(ellipse: szlib.Ellipse, **options: object) -> SocialZone:
+def fit_around(ellipse, **options):
     return fit(
         people_around(lambda _: distance_to(ellipse, ANGLES)), fraction=0, **options
     )
 
 
-def assert_same_ellipse(
-    found: szlib.Ellipse, expected: szlib.Ellipse, metres: float
-) -> None:
+def assert_same_ellipse(found, expected, metres):
     np.testing.assert_allclose(found.center, expected.center, rtol=0, atol=metres)
     np.testing.assert_allclose(found.semi_axes, expected.semi_axes, rtol=0, atol=metres)
     a, b = expected.semi_axes
@@ -85,7 +77,7 @@ def assert_same_ellipse(
 
 
 @pytest.fixture(scope="module")
-def samples() -> pd.DataFrame:
+def samples():
     """Noisy people, fewer and farther at the fringes of speed."""
     rng = np.random.default_rng(0)
     n = 4000
@@ -97,7 +89,7 @@ def samples() -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def zone(samples: pd.DataFrame) -> SocialZone:
+def zone(samples):
     return SocialZone.fit(samples, method="hull", n_resamples=20)
 
 
@@ -105,7 +97,7 @@ def zone(samples: pd.DataFrame) -> SocialZone:
 
 
 @pytest.mark.parametrize("name", KNOWN)
-def test_a_known_zone_is_recovered_at_any_speed(name: str) -> None:
+def test_a_known_zone_is_recovered_at_any_speed(name):
     zone = fit_around(KNOWN[name], speeds=(0.41, 0.5, 1.1, 1.599))
     assert sorted(zone.ellipses) == [0.41, 0.5, 1.1, 1.599]
     for speed in (0.41, 0.5, 0.777, 1.1, 1.599):
@@ -115,10 +107,10 @@ def test_a_known_zone_is_recovered_at_any_speed(name: str) -> None:
         np.testing.assert_allclose(np.hypot(*rim.T), expected, rtol=0, atol=SAGITTA)
 
 
-def test_a_zone_that_shrinks_with_speed_is_recovered() -> None:
+def test_a_zone_that_shrinks_with_speed_is_recovered():
     """Where the complement grows as a concave function of speed, the hull adds nothing to it."""
 
-    def radius(speed: float) -> float:
+    def radius(speed):
         return 1.2 - 0.5 * math.sqrt(speed - 0.3)
 
     zone = fit(
@@ -132,8 +124,8 @@ def test_a_zone_that_shrinks_with_speed_is_recovered() -> None:
 
 
 def test_the_zone_is_the_mirror_of_close_approaches_not_the_ellipse_of_the_slice(
-    zone: SocialZone,
-) -> None:
+    zone,
+):
     """Map first, enclose second: the boundary is where the complement leaves off."""
     section = zone.shape.slice(1.1)
     theta = np.linspace(-np.pi, np.pi, 50)
@@ -143,27 +135,21 @@ def test_the_zone_is_the_mirror_of_close_approaches_not_the_ellipse_of_the_slice
 
 
 @pytest.mark.parametrize("speed", [0.7, 0.9, 1.0, 1.1, 1.3])
-def test_the_ellipse_contains_the_whole_boundary(
-    zone: SocialZone, speed: float
-) -> None:
+def test_the_ellipse_contains_the_whole_boundary(zone, speed):
     level = zone.ellipse(speed).level(zone.boundary(speed, n=50_001))
     assert level.max() <= 1 + 1e-9
     assert level.max() > 1 - 1e-4  # and touches it
 
 
 @pytest.mark.parametrize("turn", [0.3, -2.0, np.pi / 2])
-def test_rotated_samples_rotate_the_zone(
-    samples: pd.DataFrame, zone: SocialZone, turn: float
-) -> None:
+def test_rotated_samples_rotate_the_zone(samples, zone, turn):
     turned = fit(samples.assign(los_angle=samples["los_angle"] + turn))
     for speed in (0.9, 1.1, 1.3):
         expected = zone.ellipse(speed).placed((0, 0), turn)
         assert_same_ellipse(turned.ellipse(speed), expected, 1e-5)
 
 
-def test_mirrored_samples_mirror_the_zone(
-    samples: pd.DataFrame, zone: SocialZone
-) -> None:
+def test_mirrored_samples_mirror_the_zone(samples, zone):
     mirrored = fit(samples.assign(los_angle=-samples["los_angle"])).ellipse(1.1)
     known = zone.ellipse(1.1)
     x, y = known.center
@@ -172,9 +158,7 @@ def test_mirrored_samples_mirror_the_zone(
     )
 
 
-def test_the_same_samples_in_any_order_give_the_same_zone(
-    samples: pd.DataFrame, zone: SocialZone
-) -> None:
+def test_the_same_samples_in_any_order_give_the_same_zone(samples, zone):
     before = samples.copy(deep=True)
     again = fit(samples)
     pd.testing.assert_frame_equal(samples, before)
@@ -190,7 +174,7 @@ def test_the_same_samples_in_any_order_give_the_same_zone(
 # --- asking ------------------------------------------------------------------------------------------
 
 
-def test_a_fitted_speed_is_the_one_in_the_table(zone: SocialZone) -> None:
+def test_a_fitted_speed_is_the_one_in_the_table(zone):
     table = zone.table()
     assert table["speed"].tolist() == sorted(zone.ellipses)
     for row in table.itertuples():
@@ -204,15 +188,13 @@ def test_a_fitted_speed_is_the_one_in_the_table(zone: SocialZone) -> None:
         assert row.area == pytest.approx(np.pi * row.a * row.b)
 
 
-def test_speed_between_fitted_speeds_is_fitted_on_demand(
-    samples: pd.DataFrame, zone: SocialZone
-) -> None:
+def test_speed_between_fitted_speeds_is_fitted_on_demand(samples, zone):
     fitted = fit(samples, speeds=[1.05]).ellipses[1.05]
     assert zone.ellipse(1.05) == fitted
     assert 1.05 not in zone.ellipses
 
 
-def test_a_speed_outside_the_data_names_the_range(zone: SocialZone) -> None:
+def test_a_speed_outside_the_data_names_the_range(zone):
     low, high = zone.speed_range
     for speed in (low - 0.1, high + 0.1):
         for ask in (zone.ellipse, zone.boundary):
@@ -223,9 +205,7 @@ def test_a_speed_outside_the_data_names_the_range(zone: SocialZone) -> None:
                 ask(speed)
 
 
-def test_undefined_speeds_warn_and_are_saved(
-    samples: pd.DataFrame, tmp_path: Path
-) -> None:
+def test_undefined_speeds_warn_and_are_saved(samples, tmp_path):
     with pytest.warns(
         szlib.DataWarning, match=r"at 0\.1 m/s is undefined.*; .*at 9 m/s is undefined"
     ):
@@ -236,7 +216,7 @@ def test_undefined_speeds_warn_and_are_saved(
     assert SocialZone.load(tmp_path / "zone.json").undefined == zone.undefined
 
 
-def test_people_seen_from_one_side_only_have_no_zone(samples: pd.DataFrame) -> None:
+def test_people_seen_from_one_side_only_have_no_zone(samples):
     ahead = samples[samples["los_angle"].abs() < np.pi / 3]
     with pytest.raises(
         szlib.ZoneError,
@@ -248,9 +228,7 @@ def test_people_seen_from_one_side_only_have_no_zone(samples: pd.DataFrame) -> N
 # --- the funnel --------------------------------------------------------------------------------------
 
 
-def test_the_provenance_counts_every_sample(
-    samples: pd.DataFrame, zone: SocialZone
-) -> None:
+def test_the_provenance_counts_every_sample(samples, zone):
     near, inliers, hull = zone.provenance["funnel"]
     assert near["entered"] == len(samples)
     assert (near["kept"], inliers["kept"]) == (inliers["entered"], hull["entered"])
@@ -267,7 +245,7 @@ def test_the_provenance_counts_every_sample(
     assert entered - kept == table.loc[table["what"].str.startswith("- "), "rows"].sum()
 
 
-def test_a_stage_that_does_not_add_up_is_refused() -> None:
+def test_a_stage_that_does_not_add_up_is_refused():
     with pytest.raises(
         szlib.SzlibError, match="funnel stage 'sieve' does not add up: 10 != 7"
     ):
@@ -295,31 +273,29 @@ def test_a_stage_that_does_not_add_up_is_refused() -> None:
         (lambda d: d.assign(speed=np.nan), szlib.ZoneError, "must be finite"),
     ],
 )
-def test_samples_without_a_zone_are_refused(
-    samples: pd.DataFrame, change: Callable, error: type[Exception], message: str
-) -> None:
+def test_samples_without_a_zone_are_refused(samples, change, error, message):
     with pytest.raises(error, match=message):
         fit(change(samples))
 
 
-def test_three_points_have_no_hull(samples: pd.DataFrame) -> None:
+def test_three_points_have_no_hull(samples):
     few = samples[samples["distance"] <= 2].head(3)
     with pytest.raises(szlib.ZoneError, match=r"n >= 4, .*got \(3, 3\)"):
         fit(few, fraction=0)
 
 
-def test_empty_speeds_are_refused(samples: pd.DataFrame) -> None:
+def test_empty_speeds_are_refused(samples):
     with pytest.raises(szlib.ZoneError, match="no speed has a zone: `speeds` is empty"):
         fit(samples, speeds=())
 
 
-def test_repr_states_method_and_verdict(zone: SocialZone) -> None:
+def test_repr_states_method_and_verdict(zone):
     assert len(repr(zone).splitlines()) == 6
     assert "verdict: undecided at 0.5" in repr(zone)
     assert "method 'hull'" in repr(zone)
 
 
-def test_plot_shows_one_speed_or_all(zone: SocialZone) -> None:
+def test_plot_shows_one_speed_or_all(zone):
     assert "1.1 m/s" in zone.plot(1.1).get_title()
     labels = [text.get_text() for text in zone.plot().get_legend().get_texts()]
     assert len(labels) == len(zone.ellipses)
@@ -328,9 +304,7 @@ def test_plot_shows_one_speed_or_all(zone: SocialZone) -> None:
 # --- files -------------------------------------------------------------------------------------------
 
 
-def test_saved_zone_loads_bit_by_bit(
-    samples: pd.DataFrame, zone: SocialZone, tmp_path: Path
-) -> None:
+def test_saved_zone_loads_bit_by_bit(samples, zone, tmp_path):
     zone.save(tmp_path / "zone.json")
     loaded = SocialZone.load(tmp_path / "zone.json")
     np.testing.assert_array_equal(loaded.shape.vertices, zone.shape.vertices)
@@ -352,7 +326,7 @@ def test_saved_zone_loads_bit_by_bit(
     numpy_options.save(tmp_path / "numpy.json")
 
 
-def test_file_states_format_version_and_units(zone: SocialZone, tmp_path: Path) -> None:
+def test_file_states_format_version_and_units(zone, tmp_path):
     zone.save(str(tmp_path / "zone.json"))
     content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
     assert (content["format"], content["version"]) == ("szlib.SocialZone", 5)
@@ -360,9 +334,7 @@ def test_file_states_format_version_and_units(zone: SocialZone, tmp_path: Path) 
     assert content["provenance"]["szlib"] == szlib.__version__
 
 
-def test_zone_of_another_version_of_szlib_loads(
-    zone: SocialZone, tmp_path: Path
-) -> None:
+def test_zone_of_another_version_of_szlib_loads(zone, tmp_path):
     old = replace(zone, provenance=zone.provenance | {"szlib": "0.1.0"})
     old.save(tmp_path / "zone.json")
     loaded = SocialZone.load(tmp_path / "zone.json")
@@ -370,7 +342,7 @@ def test_zone_of_another_version_of_szlib_loads(
     assert loaded.provenance["szlib"] == "0.1.0" != szlib.__version__
 
 
-def test_saving_replaces_a_file_as_a_whole(zone: SocialZone, tmp_path: Path) -> None:
+def test_saving_replaces_a_file_as_a_whole(zone, tmp_path):
     path = tmp_path / "zone.json"
     zone.save(path)
     before = path.read_bytes()
@@ -382,7 +354,7 @@ def test_saving_replaces_a_file_as_a_whole(zone: SocialZone, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("place", ["missing/zone.json", "file/zone.json", "folder"])
-def test_unwritable_path_is_named(zone: SocialZone, tmp_path: Path, place: str) -> None:
+def test_unwritable_path_is_named(zone, tmp_path, place):
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").touch()
     with pytest.raises(szlib.ZoneError, match=f"{place}: cannot write the zone"):
@@ -390,8 +362,8 @@ def test_unwritable_path_is_named(zone: SocialZone, tmp_path: Path, place: str) 
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder"]
 
 
-def broken(change: Callable[[dict], object]) -> Callable[[str], str]:
-    def apply(text: str) -> str:
+def broken(change):
+    def apply(text):
         content = json.loads(text)
         return json.dumps(change(content) or content)
 
@@ -399,7 +371,7 @@ def broken(change: Callable[[dict], object]) -> Callable[[str], str]:
 
 
 CHECKSUM = "is damaged: its checksum"
-BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
+BROKEN = {
     "empty": (lambda _: "", "cannot be read as a zone"),
     "truncated": (lambda text: text[: len(text) // 2], "cannot be read as a zone"),
     "not UTF-8": (lambda _: b"\xff\xfe\x00", "cannot be read as a zone"),
@@ -438,9 +410,7 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
 
 
 @pytest.mark.parametrize(("change", "message"), BROKEN.values(), ids=BROKEN)
-def test_damaged_file_is_refused_by_name(
-    zone: SocialZone, tmp_path: Path, change: Callable[[str], str | bytes], message: str
-) -> None:
+def test_damaged_file_is_refused_by_name(zone, tmp_path, change, message):
     path = tmp_path / "zone.json"
     zone.save(path)
     content = change(path.read_text(encoding="utf-8"))
@@ -449,7 +419,7 @@ def test_damaged_file_is_refused_by_name(
         SocialZone.load(path)
 
 
-def test_missing_file_is_refused(tmp_path: Path) -> None:
+def test_missing_file_is_refused(tmp_path):
     for path in (tmp_path / "missing.json", tmp_path):
         with pytest.raises(
             szlib.ZoneError, match=f"{path.name}: cannot be read as a zone"
@@ -458,7 +428,7 @@ def test_missing_file_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("r_max", [0, -1, np.nan, np.inf])
-def test_invalid_r_max_is_refused(zone: SocialZone, r_max: float) -> None:
+def test_invalid_r_max_is_refused(zone, r_max):
     with pytest.raises(szlib.ZoneError, match="r_max must be a positive distance"):
         replace(zone, r_max=r_max)
 
@@ -467,7 +437,7 @@ def test_invalid_r_max_is_refused(zone: SocialZone, r_max: float) -> None:
 
 
 @pytest.mark.parametrize("method", ["hull", "paper"])
-def test_every_method_finds_the_known_zone(samples: pd.DataFrame, method: str) -> None:
+def test_every_method_finds_the_known_zone(samples, method):
     """One person in thirty is within 6 cm of the rim: so near are both ways to it."""
     zone = fit(
         samples, method=method, **({"fraction": 0.0} if method == "hull" else {})
@@ -484,9 +454,7 @@ def test_every_method_finds_the_known_zone(samples: pd.DataFrame, method: str) -
 
 
 @pytest.mark.parametrize("method", ["hull", "paper"])
-def test_zone_of_every_method_drives_the_robot_and_reloads(
-    samples: pd.DataFrame, method: str, tmp_path: Path
-) -> None:
+def test_zone_of_every_method_drives_the_robot_and_reloads(samples, method, tmp_path):
     zone = SocialZone.fit(samples, method=method, n_resamples=20)
     with pytest.warns(szlib.DataWarning, match="should not be relied on: undecided"):
         assert szlib.MPCCBF(zone).zone == zone.ellipse(1.1)
@@ -510,9 +478,7 @@ def test_zone_of_every_method_drives_the_robot_and_reloads(
     ).read_bytes()
 
 
-def test_intervals_do_not_change_the_zone(
-    samples: pd.DataFrame, zone: SocialZone
-) -> None:
+def test_intervals_do_not_change_the_zone(samples, zone):
     plain = fit(samples)
     assert plain.ellipses == zone.ellipses
     np.testing.assert_array_equal(plain.shape.vertices, zone.shape.vertices)
@@ -531,14 +497,12 @@ def test_intervals_do_not_change_the_zone(
         ({"n_resamples": 1}, "resamples must be a whole number, 0 .no intervals. or at least 2; got 1"),
     ],
 )  # fmt: skip
-def test_invalid_options_are_refused(
-    samples: pd.DataFrame, options: dict, message: str
-) -> None:
+def test_invalid_options_are_refused(samples, options, message):
     with pytest.raises(szlib.SzlibError, match=message):
         fit(samples, **options)
 
 
-def made_null(n: int = 3000, *, r_max: float = 2.0) -> szlib.NullEncounters:
+def made_null(n=3000, *, r_max=2.0):
     samples = wanderers(n).assign(shift=lambda d: d["encounter"] % 20)
     first = samples.groupby("encounter")
     encounters = pd.DataFrame(
@@ -550,7 +514,7 @@ def made_null(n: int = 3000, *, r_max: float = 2.0) -> szlib.NullEncounters:
     )
 
 
-def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
+def test_respect_zone_is_found_and_saved_with_its_test(tmp_path):
     people = respecting(
         passing_pairs(1200, 1), szlib.Ellipse((0.0, 0.0), (0.8, 0.7)), careless=0.05
     )
@@ -566,7 +530,7 @@ def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
     assert loaded.provenance == zone.provenance
 
 
-def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
+def test_any_zone_can_be_tested_against_a_null(samples):
     zone = fit(wanderers(300, seed=5), method="hull", speeds=(1.1,), null=made_null())
     assert zone.null_test.p_value > 0.05
     assert fit(samples).null_test is None
@@ -582,7 +546,7 @@ def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
         ),
     ],
 )
-def test_respect_without_valid_null_is_refused(options: dict, message: str) -> None:
+def test_respect_without_valid_null_is_refused(options, message):
     with pytest.raises(szlib.ZoneError, match=message):
         fit(passers(50), method="respect", **options)
 
@@ -591,7 +555,7 @@ def test_respect_without_valid_null_is_refused(options: dict, message: str) -> N
 
 
 @pytest.mark.filterwarnings("ignore:6 encounters are too few to find outliers")
-def test_low_sample_zone_warns(samples: pd.DataFrame, tmp_path: Path) -> None:
+def test_low_sample_zone_warns(samples, tmp_path):
     six = samples[samples["encounter"] < 6]
     for method in ("hull", "paper"):
         with pytest.warns(
@@ -607,7 +571,7 @@ def test_low_sample_zone_warns(samples: pd.DataFrame, tmp_path: Path) -> None:
                 szlib.MPCCBF(again)
 
 
-def test_side_with_few_encounters_is_named(samples: pd.DataFrame) -> None:
+def test_side_with_few_encounters_is_named(samples):
     left = np.abs(samples["los_angle"] - np.pi / 2) < np.pi / 8
     with pytest.warns(
         szlib.DataWarning, match=r"fewer than 20 encounters were seen left \([0-9]\)$"
@@ -618,7 +582,7 @@ def test_side_with_few_encounters_is_named(samples: pd.DataFrame) -> None:
     ) or "left (" in zone.missing_data(1.1)
 
 
-def test_speed_without_encounters_is_not_adequate(zone: SocialZone) -> None:
+def test_speed_without_encounters_is_not_adequate(zone):
     enough = replace(zone, provenance=zone.provenance | {"encounters": 600})
     assert enough.adequate(1.0)  # between 0.9 and 1.1
     assert not zone.adequate(1.0)  # 130 encounters
@@ -649,8 +613,8 @@ def test_speed_without_encounters_is_not_adequate(zone: SocialZone) -> None:
     ],
 )
 def test_damaged_content_with_a_matching_checksum_is_refused(
-    zone: SocialZone, tmp_path: Path, damage: Callable[[dict], object], message: str
-) -> None:
+    zone, tmp_path, damage, message
+):
     file = tmp_path / "zone.json"
     zone.save(file)
     content = json.loads(file.read_text(encoding="utf-8"))
@@ -664,8 +628,8 @@ def test_damaged_content_with_a_matching_checksum_is_refused(
 
 
 def test_samples_without_encounter_give_a_zone_of_unknown_quality(
-    samples: pd.DataFrame,
-) -> None:
+    samples,
+):
     with pytest.warns(
         szlib.DataWarning,
         match="^the quality of the zone is unknown.*samples without `encounter`.*again$",
@@ -676,16 +640,14 @@ def test_samples_without_encounter_give_a_zone_of_unknown_quality(
     assert (zone.side_counts, zone.uncertainty) == (None, None)
 
 
-def test_default_speeds_are_those_of_walking_people() -> None:
+def test_default_speeds_are_those_of_walking_people():
     assert pytest.approx(np.arange(0.5, 1.6, 0.2)) == SPEEDS
 
 
 # --- the real day ------------------------------------------------------------------------------------
 
 
-def test_real_day_has_zones_at_walking_speeds(
-    real_samples: pd.DataFrame, tmp_path: Path
-) -> None:
+def test_real_day_has_zones_at_walking_speeds(real_samples, tmp_path):
     with pytest.warns(
         szlib.DataWarning,
         match=r"at 1\.1 m/s fewer than 20 encounters were seen .*behind \(",
@@ -708,7 +670,7 @@ def test_real_day_has_zones_at_walking_speeds(
     assert SocialZone.load(tmp_path / "zone.json").provenance == zone.provenance
 
 
-def test_the_papers_method_is_a_hull_after_lof_over_samples() -> None:
+def test_the_papers_method_is_a_hull_after_lof_over_samples():
     samples = passers(400, seed=3)
     paper = fit(samples, method="paper", speeds=(1.1,))
     same = fit(samples, fraction=0.002, n_neighbours=20, speeds=(1.1,))
@@ -723,7 +685,7 @@ def test_the_papers_method_is_a_hull_after_lof_over_samples() -> None:
         fit(samples, method="paper", fraction=0.01)
 
 
-def test_the_papers_zone_is_saved_under_its_name(tmp_path: Path) -> None:
+def test_the_papers_zone_is_saved_under_its_name(tmp_path):
     zone = fit(passers(400, seed=3), method="paper", speeds=(1.1,))
     zone.save(tmp_path / "zone.json")
     assert SocialZone.load(tmp_path / "zone.json").method == "paper"
@@ -733,9 +695,7 @@ def test_the_papers_zone_is_saved_under_its_name(tmp_path: Path) -> None:
     ("people", "size"), [("everybody", (1.01, 0.77)), ("strangers", (1.31, 1.03))]
 )
 @pytest.mark.filterwarnings("ignore::szlib.DataWarning")
-def test_the_papers_zone_of_the_real_day(
-    people: str, size: tuple[float, float], real_samples
-) -> None:
+def test_the_papers_zone_of_the_real_day(people, size, real_samples):
     samples = (
         real_samples if people == "everybody" else szlib.of_kind(real_samples, people)
     )

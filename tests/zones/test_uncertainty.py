@@ -1,9 +1,5 @@
 """Uncertainty: counts by side, resampling units, coverage of intervals."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,7 +8,7 @@ from scipy.stats import norm
 from studies.quantile_zone import QuantileEstimator
 
 import szlib
-from szlib.zones.estimators import Estimator, ZoneShape
+from szlib.zones.estimators import Estimator
 from szlib.zones.uncertainty import (
     _MAX_FAILED,
     MIN_DAYS,
@@ -28,18 +24,18 @@ from szlib.zones.uncertainty import (
 SPEEDS = (1.1,)
 
 
-def fit(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
+def fit(samples, **options):
     return szlib.SocialZone.fit(
         samples, speeds=SPEEDS, **{"method": "quantile", **options}
     )
 
 
 @pytest.fixture(scope="module")
-def samples() -> pd.DataFrame:
+def samples():
     return passers(300)
 
 
-def test_each_side_counts_encounters_not_samples() -> None:
+def test_each_side_counts_encounters_not_samples():
     rows = [
         (0, 0.0, 1.0, 1.0), (0, 0.1, 1.0, 1.0),  # one, ahead
         (1, np.pi, 1.0, 1.15), (2, -np.pi, 1.0, 0.85),  # two, behind
@@ -56,7 +52,7 @@ def test_each_side_counts_encounters_not_samples() -> None:
     assert seen.loc[1, list(SIDES)].sum() == seen.loc[1, "ahead left"] == 1
 
 
-def test_missing_sides_are_named() -> None:
+def test_missing_sides_are_named():
     seen = pd.DataFrame(
         [
             [1.0, 99, *[MIN_ENCOUNTERS] * 8],
@@ -76,7 +72,7 @@ def test_missing_sides_are_named() -> None:
     )
 
 
-def test_pairs_are_resampled_or_days_if_there_are_many() -> None:
+def test_pairs_are_resampled_or_days_if_there_are_many():
     table = pd.DataFrame(
         {"day": ["a", "a", "a", "b"], "ref_id": [1, 2, 1, 1], "other_id": [2, 1, 3, 2]}
     )
@@ -93,7 +89,7 @@ def test_pairs_are_resampled_or_days_if_there_are_many() -> None:
     assert (unit, member.tolist()) == ("days", days["day"].tolist())
 
 
-def test_intervals_are_the_same_for_the_same_seed_only(samples: pd.DataFrame) -> None:
+def test_intervals_are_the_same_for_the_same_seed_only(samples):
     one, same, other = (
         fit(samples, n_resamples=30, seed=seed).uncertainty for seed in (0, 0, 1)
     )
@@ -105,7 +101,7 @@ def test_intervals_are_the_same_for_the_same_seed_only(samples: pd.DataFrame) ->
     assert (one.unit, one.level, one.n_resamples) == ("pairs", 0.95, 30)
 
 
-def test_more_people_make_narrower_intervals() -> None:
+def test_more_people_make_narrower_intervals():
     few, many = (
         fit(passers(n), n_resamples=60).uncertainty.intervals for n in (150, 2400)
     )
@@ -114,9 +110,7 @@ def test_more_people_make_narrower_intervals() -> None:
 
 
 @pytest.mark.parametrize("method", ["quantile", "hull"])
-def test_second_view_of_a_pair_does_not_narrow_the_interval(
-    samples: pd.DataFrame, method: str
-) -> None:
+def test_second_view_of_a_pair_does_not_narrow_the_interval(samples, method):
     """The other person's view of the same encounter makes the interval no narrower."""
     twice = pd.concat(
         [
@@ -137,7 +131,7 @@ def test_second_view_of_a_pair_does_not_narrow_the_interval(
     )
 
 
-def test_hull_interval_lies_inside_the_hull() -> None:
+def test_hull_interval_lies_inside_the_hull():
     """People keep out of a zone that no sample shows whole: the interval reaches farther in than the hull."""
     samples = passers(300)
     zone = fit(samples, method="hull", fraction=0.0, n_resamples=60)
@@ -148,7 +142,7 @@ def test_hull_interval_lies_inside_the_hull() -> None:
     assert area["area_low"] < truth < area["area"]
 
 
-def test_intervals_contain_the_limit() -> None:
+def test_intervals_contain_the_limit():
     """In short: 25 data sets of 200 pairs; 200 plazas are in notebooks/tables/25_coverage.csv."""
     limit = fit(passers(20_000, seed=99), n_resamples=0).table().iloc[0]
     held = []
@@ -166,7 +160,7 @@ def test_intervals_contain_the_limit() -> None:
     assert np.mean(held) >= 0.85
 
 
-def test_resamples_without_a_zone_leave_no_interval() -> None:
+def test_resamples_without_a_zone_leave_no_interval():
     """Three people seen around more than half of the circle: without one of them there is no zone."""
     three = passers(3, seed=4)
     with pytest.warns(szlib.DataWarning, match="fewer than 20"):
@@ -175,9 +169,7 @@ def test_resamples_without_a_zone_leave_no_interval() -> None:
 
 
 @pytest.mark.parametrize("resamples", [1, -3, 2.5])
-def test_invalid_n_resamples_is_refused(
-    samples: pd.DataFrame, resamples: float
-) -> None:
+def test_invalid_n_resamples_is_refused(samples, resamples):
     with pytest.raises(szlib.DataError, match="resamples must be a whole number"):
         estimate_uncertainty(
             QuantileEstimator.from_samples(samples, r_max=2.0),
@@ -187,7 +179,7 @@ def test_invalid_n_resamples_is_refused(
         )
 
 
-def known_ellipses(ahead: float, angle: float = 0.0) -> dict[float, szlib.Ellipse]:
+def known_ellipses(ahead, angle=0.0):
     """Ellipses with a centre `ahead` [m], at all `SPEEDS`."""
     return {v: szlib.Ellipse((ahead, 0.0), (1.0, 0.7), angle) for v in SPEEDS}
 
@@ -195,10 +187,10 @@ def known_ellipses(ahead: float, angle: float = 0.0) -> dict[float, szlib.Ellips
 class Known(Estimator):
     """An estimator whose ellipses are known: around 5 m ahead in the resamples."""
 
-    def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
+    def fit_shape(self, speeds):
         raise NotImplementedError
 
-    def refit(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
+    def refit(self, weights, speeds):
         ellipses = np.tile([5.0, 0.0, 1.0, 0.7, 0.0], (len(weights), len(speeds), 1))
         ellipses[..., 0] += self.parameters["differences"][:, None]
         return ellipses
@@ -210,9 +202,7 @@ class KnownExtreme(Known):
     is_extreme = True
 
 
-def interval(
-    differences: np.ndarray, kind: type[Known] = Known, n: int = 30
-) -> np.ndarray:
+def interval(differences, kind=Known, n=30):
     """Low and high of the centre ahead, if it differs so in the resamples of `n` encounters."""
     encounters = pd.DataFrame({"encounter": range(n)})
     parameters = {"differences": np.random.default_rng(0).permuted(differences)}
@@ -225,7 +215,7 @@ def interval(
     return found.loc["center_x", ["low", "high"]].to_numpy(float)
 
 
-def test_intervals_are_quantiles_of_the_differences() -> None:
+def test_intervals_are_quantiles_of_the_differences():
     differences = np.linspace(-1, 3, 4001)
     factor = np.sqrt(1 / 2) / (1 - np.sqrt(1 / 2))  # one of two encounters, rate 1/2
     found = interval(differences, KnownExtreme, n=2)
@@ -234,7 +224,7 @@ def test_intervals_are_quantiles_of_the_differences() -> None:
     assert interval(differences - 1) == pytest.approx((5 - 1.9, 5 + 1.9)), "no bias"
 
 
-def test_percentiles_are_corrected_for_bias() -> None:
+def test_percentiles_are_corrected_for_bias():
     """A share of 60 % lies below: both levels are moved up by twice its normal quantile."""
     bias = 2 * norm.ppf((600 + 1 / 2) / 1001)
     levels = norm.cdf(bias + norm.ppf([0.025, 0.975]))
@@ -242,7 +232,7 @@ def test_percentiles_are_corrected_for_bias() -> None:
     assert found == pytest.approx(5 - 0.6 + levels, abs=1e-9)
 
 
-def test_an_interval_needs_a_zone_in_most_resamples() -> None:
+def test_an_interval_needs_a_zone_in_most_resamples():
     differences = np.linspace(-1, 1, 100)
     failed = int(_MAX_FAILED * 100)
     differences[:failed] = np.nan
@@ -254,15 +244,15 @@ def test_an_interval_needs_a_zone_in_most_resamples() -> None:
 class Turning(Estimator):
     """An estimator whose ellipse is at 91 degrees in every resample."""
 
-    def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
+    def fit_shape(self, speeds):
         raise NotImplementedError
 
-    def refit(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
+    def refit(self, weights, speeds):
         ellipse = [0.0, 0.0, 1.0, 0.7, np.radians(-89)]
         return np.broadcast_to(ellipse, (len(weights), len(speeds), 5))
 
 
-def test_an_axis_has_no_direction() -> None:
+def test_an_axis_has_no_direction():
     encounters = pd.DataFrame({"encounter": range(30)})
     estimator = Turning(encounters=encounters, parameters={}, funnel=[])
     ellipses = known_ellipses(0.0, np.radians(89))

@@ -1,11 +1,8 @@
 """The verdict: respect, nobody's respect and too little data are told apart, with reasons."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,9 +18,7 @@ from szlib.zones.verdict import describe_missing_encounters
 SHIFTS, SPEED = 39, 1.1
 
 
-def walkers(
-    seed: int, n: int, *, core: float = 0.0, careless: float = 0.0
-) -> pd.DataFrame:
+def walkers(seed, n, *, core=0.0, careless=0.0):
     """Straight paths past a person, as evenly near as chance has it; within `core` only the careless."""
     rng = np.random.default_rng(seed)
     tries = 4 * n
@@ -46,7 +41,7 @@ def walkers(
 
 
 @cache
-def null() -> szlib.NullEncounters:
+def null():
     samples = walkers(99, SHIFTS * 100)
     samples["shift"] = samples["encounter"] % SHIFTS
     first = samples.groupby("encounter")
@@ -60,21 +55,21 @@ def null() -> szlib.NullEncounters:
 
 
 @pytest.mark.filterwarnings("ignore:at 1.1 m/s fewer than 20")
-def fit(samples: pd.DataFrame, **options: Any) -> szlib.SocialZone:
+def fit(samples, **options):
     return szlib.SocialZone.fit(
         samples, **{"speeds": [SPEED], "null": null(), "n_resamples": 60} | options
     )
 
 
 @pytest.fixture(scope="module")
-def careful() -> szlib.SocialZone:
+def careful():
     return fit(walkers(1, 1500, core=0.8))
 
 
 # --- the three verdicts ------------------------------------------------------------------------------
 
 
-def test_careful_people_in_number_are_usable(careful: szlib.SocialZone) -> None:
+def test_careful_people_in_number_are_usable(careful):
     verdict = careful.verdict(SPEED)
     assert verdict == "usable", verdict.sentence
     assert "people avoid each other (p = " in verdict.sentence
@@ -82,13 +77,13 @@ def test_careful_people_in_number_are_usable(careful: szlib.SocialZone) -> None:
 
 
 @pytest.mark.parametrize("method", ["paper", "hull"])
-def test_people_who_ignore_each_other_show_no_respect(method: str) -> None:
+def test_people_who_ignore_each_other_show_no_respect(method):
     verdict = fit_quietly(walkers(2, 1500), method=method).verdict(SPEED)
     assert verdict == "no respect shown"
     assert "as near as people who ignore each other" in verdict.reasons[0]
 
 
-def fit_quietly(samples: pd.DataFrame, **options: Any) -> szlib.SocialZone:
+def fit_quietly(samples, **options):
     """As `fit`; a method may find no zone at all, which is as good an answer."""
     try:
         return fit(samples, **options)
@@ -96,7 +91,7 @@ def fit_quietly(samples: pd.DataFrame, **options: Any) -> szlib.SocialZone:
         return replace(fit(samples), method="paper")
 
 
-def test_few_strangers_are_undecided_and_told_the_hours() -> None:
+def test_few_strangers_are_undecided_and_told_the_hours():
     few = fit(walkers(3, 151, core=0.8))
     assert few.verdict(SPEED) == "undecided"
     hours = (151 - 1) * 20 / 3600
@@ -108,7 +103,7 @@ def test_few_strangers_are_undecided_and_told_the_hours() -> None:
     assert not few.adequate(SPEED)
 
 
-def test_without_a_null_model_nothing_is_decided() -> None:
+def test_without_a_null_model_nothing_is_decided():
     zone = fit(walkers(1, 1500, core=0.8), null=None)
     assert zone.verdict(SPEED) == "undecided"
     assert any(
@@ -120,7 +115,7 @@ def test_without_a_null_model_nothing_is_decided() -> None:
 # --- each condition alone ----------------------------------------------------------------------------
 
 
-def test_careless_share_above_q_is_noticed() -> None:
+def test_careless_share_above_q_is_noticed():
     """The quantile collapses there."""
     zone = fit(walkers(4, 1500, core=1.0, careless=0.3))
     assert zone.null_test.is_significant
@@ -135,15 +130,13 @@ def test_careless_share_above_q_is_noticed() -> None:
         ({"side_counts": None}, "encounters were not counted by side"),
     ],
 )
-def test_every_condition_is_needed(
-    careful: szlib.SocialZone, change: dict[str, Any], reason: str
-) -> None:
+def test_every_condition_is_needed(careful, change, reason):
     verdict = replace(careful, **change).verdict(SPEED)
     assert verdict == "undecided"
     assert any(reason in each for each in verdict.reasons)
 
 
-def test_a_tracker_that_loses_people_is_undecided(careful: szlib.SocialZone) -> None:
+def test_a_tracker_that_loses_people_is_undecided(careful):
     """Unless respect shows beyond the distance that it resolves, and the zone reaches farther than that."""
     sensor = szlib.encounters.SensorCheck(50, 9000, 0.6, 0.45, 0.73, 0.01, 0.6)
     for p_beyond, expected in ((0.4, "undecided"), (0.01, "usable")):
@@ -157,8 +150,8 @@ def test_a_tracker_that_loses_people_is_undecided(careful: szlib.SocialZone) -> 
 
 
 def test_a_zone_no_larger_than_that_of_people_who_ignore_each_other_is_undecided(
-    careful: szlib.SocialZone,
-) -> None:
+    careful,
+):
     test = replace(careful.null_test, null_radius=1.5)
     verdict = replace(careful, null_test=test).verdict(SPEED)
     assert verdict == "undecided"
@@ -173,8 +166,8 @@ def test_a_zone_no_larger_than_that_of_people_who_ignore_each_other_is_undecided
     ],
 )
 def test_intervals_in_the_wrong_place_or_too_wide_are_undecided(
-    careful: szlib.SocialZone, quantity: str, low: float, high: float, reason: str
-) -> None:
+    careful, quantity, low, high, reason
+):
     known = careful.uncertainty
     rows = known.intervals.copy()
     rows.loc[rows["quantity"] == quantity, ["low", "high"]] = low, high
@@ -185,13 +178,13 @@ def test_intervals_in_the_wrong_place_or_too_wide_are_undecided(
     assert re.search(reason, verdict.sentence)
 
 
-def test_chains_that_do_not_agree_are_undecided(careful: szlib.SocialZone) -> None:
+def test_chains_that_do_not_agree_are_undecided(careful):
     apart = replace(careful.uncertainty, has_converged=False)
     verdict = replace(careful, uncertainty=apart).verdict(SPEED)
     assert "the draws of the posterior do not agree" in verdict.sentence
 
 
-def test_implausible_data_are_undecided(careful: szlib.SocialZone) -> None:
+def test_implausible_data_are_undecided(careful):
     text = "people move at 4.18 m/s: feet?"
     funnel = [{"stage": f"warning: {text}", "entered": 1, "kept": 1, "rejected": {}}]
     implausible = replace(careful, provenance=careful.provenance | {"funnel": funnel})
@@ -199,19 +192,19 @@ def test_implausible_data_are_undecided(careful: szlib.SocialZone) -> None:
     assert text in implausible.verdict(SPEED).reasons
 
 
-def test_speed_without_data_is_undecided(careful: szlib.SocialZone) -> None:
+def test_speed_without_data_is_undecided(careful):
     assert careful.verdict(1.6) == "undecided"
     assert "at 1.6 m/s no encounters were counted" in careful.verdict(1.6).sentence
 
 
-def test_missing_encounters_need_no_times() -> None:
+def test_missing_encounters_need_no_times():
     assert describe_missing_encounters({"encounters": 300, "hours": None}).endswith(
         "600 are needed"
     )
     assert describe_missing_encounters({"encounters": 600, "hours": 1.0}) == ""
 
 
-def test_null_model_must_reach_as_far_as_the_zone() -> None:
+def test_null_model_must_reach_as_far_as_the_zone():
     with pytest.raises(
         szlib.ZoneError,
         match=r"r_max must be at most the null model's 2\.0 m; got 2\.5",
@@ -222,16 +215,14 @@ def test_null_model_must_reach_as_far_as_the_zone() -> None:
 # --- where it is shown -------------------------------------------------------------------------------
 
 
-def test_verdict_is_saved_and_made_again(
-    careful: szlib.SocialZone, tmp_path: Any
-) -> None:
+def test_verdict_is_saved_and_made_again(careful, tmp_path):
     careful.save(tmp_path / "zone.json")
     loaded = szlib.SocialZone.load(tmp_path / "zone.json")
     assert loaded.verdict(SPEED).sentence == careful.verdict(SPEED).sentence
     assert '"usable"' in (tmp_path / "zone.json").read_text(encoding="utf-8")
 
 
-def test_controller_warns_unless_usable(careful: szlib.SocialZone) -> None:
+def test_controller_warns_unless_usable(careful):
     szlib.MPCCBF(careful)
     with pytest.warns(
         szlib.DataWarning,
@@ -244,7 +235,7 @@ def test_controller_warns_unless_usable(careful: szlib.SocialZone) -> None:
 
 
 @pytest.mark.parametrize("core", [0.5, 0.8, 1.0])
-def test_core_is_found_and_held(core: float) -> None:
+def test_core_is_found_and_held(core):
     radii = [
         fit_radius(
             collect_approaches(walkers(k, 400, core=core, careless=0.05), null())
@@ -256,7 +247,7 @@ def test_core_is_found_and_held(core: float) -> None:
     assert held >= 0.83  # 90 % or more are expected; fewer than 25 of 30: 1 %
 
 
-def walk_around(core: float, noise: float = 0.0) -> szlib.NullTest:
+def walk_around(core, noise=0.0):
     """The test of people who swerve around circles, seen with a `noise` [m]."""
     rng = np.random.default_rng(0)
     walks = crowds.singles(rng, 800, 1200.0)
@@ -267,19 +258,19 @@ def walk_around(core: float, noise: float = 0.0) -> szlib.NullTest:
 
 
 @pytest.mark.parametrize("core", [0.5, 1.0])
-def test_people_who_step_aside_do_not_shrink_the_radius(core: float) -> None:
+def test_people_who_step_aside_do_not_shrink_the_radius(core):
     """They are seen just outside of the circle around which they swerve."""
     found = walk_around(core).respect
     assert found.low <= core <= found.high
     assert found.high - found.low < 0.15
 
 
-def test_noise_hardly_shrinks_the_radius() -> None:
+def test_noise_hardly_shrinks_the_radius():
     """The nearest of many distances with an error of 7 cm is 9 cm too near."""
     assert walk_around(0.8, noise=0.05).respect.radius == pytest.approx(0.8, abs=0.05)
 
 
-def test_radius_does_not_shrink_as_encounters_are_added() -> None:
+def test_radius_does_not_shrink_as_encounters_are_added():
     small = [
         fit_radius(
             collect_approaches(walkers(k, 150, core=0.8, careless=0.05), null())
@@ -292,7 +283,7 @@ def test_radius_does_not_shrink_as_encounters_are_added() -> None:
     assert np.mean(small) == pytest.approx(many, abs=0.04)
 
 
-def test_mix_of_kinds_does_not_matter() -> None:
+def test_mix_of_kinds_does_not_matter():
     """One kind comes nearer by chance, and is rarer in the data."""
     far = null().encounters.assign(
         kind="opposite", nearest=lambda d: 1.2 + d["nearest"] / 4
@@ -308,7 +299,7 @@ def test_mix_of_kinds_does_not_matter() -> None:
     assert both.low == 0
 
 
-def test_cores_in_simulated_crowds_are_found() -> None:
+def test_cores_in_simulated_crowds_are_found():
     tracks = noninteracting_crowd(seed=5, people=1500, minutes=30)
     samples = szlib.find_encounters(tracks)
     against = szlib.null_encounters(tracks, shifts=19, progress=False)
