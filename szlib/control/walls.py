@@ -6,7 +6,7 @@ The cells that are occupied are united and simplified; the outlines are the wall
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from math import cos, sin
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,12 @@ from numpy.typing import ArrayLike
 from PIL import Image
 from shapely.affinity import affine_transform
 
-from ..core.checks import Array, check_array, check_number, require
+from ..core.checks import Array, check_array, check_number, check_vector, require
 from ..core.errors import DataError, SolverError
 from ..core.input_files import printable, read_small
 from .obstacles import SHORTEST_WALL
 
-_NUMBERS = {"origin": (3,), "resolution": (), "free_thresh": (), "occupied_thresh": ()}
-_EIGHT_BITS = "1", "L", "LA", "P", "PA", "RGB", "RGBA"
-_MOST_PIXELS = 50_000_000  # of a picture; a file of 10 MB may hold many more
+_PICTURES = "1", "L", "P", "RGB"  # modes of Pillow: of at most 8 bits, not transparent
 
 
 def read_walls(walls: Any) -> Array:
@@ -34,10 +32,9 @@ def read_walls(walls: Any) -> Array:
     Parameters
     ----------
     walls : segments, shape (2, 2) each; polylines, shape (m, 2); Shapely's lines, rings, polygons and
-        collections, or objects with `.coords`, `.exterior` and `.interiors`, or `.geoms` like them; one or
-        many, nested in any way. The outline of a polygon and the edges of its holes are walls; to an `MPCCBF`
-        it is solid, so give a room by its `exterior`. Corners of a line that are closer than `SHORTEST_WALL`
-        count as one.
+        collections; one or many, nested in any way. The outline of a polygon and the edges of its holes are
+        walls; to an `MPCCBF` it is solid, so give a room by its `exterior`. Corners of a line that are closer
+        than `SHORTEST_WALL` count as one.
 
     Raises
     ------
@@ -60,57 +57,44 @@ def read_walls(walls: Any) -> Array:
 
 
 class Walls(np.ndarray[Any, np.dtype[np.float64]]):
-    """Segments, shape (n, 2, 2) [m], that know which areas they enclose; what is computed from them does not.
+    """Segments, shape (n, 2, 2) [m], that enclose the areas `solids`; what is computed from them does not."""
 
-    Attributes
-    ----------
-    solids : these areas, of Shapely; None: not known.
-    """
-
-    solids: Any = None
+    solids: Any
 
 
 def find_solids(walls: Any) -> Any:
-    """The union of the polygons among `walls`, and of `Walls.solids`; None if there are none."""
+    """The union of the areas that `walls` enclose, of Shapely; None if there are none."""
     found = [area for _, area in _find_shapes(walls) if area is not None]
     return shapely.union_all(found) if found else None
 
 
 def _find_shapes(walls: Any) -> Iterator[tuple[Any, Any]]:
     """Lines among nested `walls`, shape (n,), each with the area that they enclose, or None; of Shapely."""
-    parts = getattr(walls, "geoms", walls)
-    if hasattr(parts, "exterior"):
-        holes = [hole.coords for hole in parts.interiors]
-        area = shapely.Polygon(parts.exterior.coords, holes)
-        yield shapely.get_parts(area.boundary), shapely.make_valid(area)
-    elif hasattr(parts, "coords"):
-        yield _draw_lines([corner[:2] for corner in parts.coords]), None
-    elif isinstance(parts, str) or not isinstance(parts, Iterable):
-        expected = "a segment, a line, or one of Shapely's"
-        raise SolverError(f"a wall must be {expected}; got {walls!r}")
-    elif isinstance(parts, np.ndarray) or any(map(_is_corner, parts)):
-        yield _draw_lines(parts), getattr(parts, "solids", None)
-    else:
-        for part in parts:
+    if hasattr(walls, "geoms"):
+        walls = list(walls.geoms)
+    is_nested = isinstance(walls, list | tuple) and not any(map(_is_corner, walls))
+    if is_nested:
+        for part in walls:
             yield from _find_shapes(part)
+    elif isinstance(walls, shapely.Polygon):
+        yield shapely.get_parts(walls.boundary), shapely.make_valid(walls)
+    elif isinstance(walls, shapely.LineString):
+        yield [walls], None
+    else:
+        corners = check_array("a wall", walls, (...,))
+        given = corners.shape
+        is_line = len(given) > 1 and given[-1] == 2 and given[-2] > 1
+        expected = (
+            "a line of shape (m, 2), with m > 1, or segments of shape (n, 2, 2); make them of rows of four "
+            "numbers by np.reshape(walls, (-1, 2, 2))"
+        )
+        require(is_line, "a wall", given, expected, SolverError)
+        yield np.ravel(shapely.linestrings(corners)), getattr(walls, "solids", None)
 
 
 def _is_corner(part: Any) -> bool:
-    return isinstance(part, Sequence | np.ndarray) and all(map(np.isscalar, part))
-
-
-def _draw_lines(corners: Any) -> Any:
-    """Lines of Shapely from their corners, shape (..., m, 2) [m]."""
-    numbers = check_array("a wall", corners, (...,))
-    given = numbers.shape
-    if given[1:] == (4,):
-        raise SolverError(
-            "walls must be segments [[(xa, ya), (xb, yb)], ...], shape (n, 2, 2); got rows of four numbers: "
-            "use np.reshape(walls, (-1, 2, 2))"
-        )
-    is_line = given[-1:] == (2,) and len(given) > 1 and given[-2] > 1
-    require(is_line, "a wall", given, "of shape (m, 2), with m > 1", SolverError)
-    return np.ravel(shapely.linestrings(numbers))
+    is_list = isinstance(part, list | tuple | np.ndarray)
+    return is_list and all(map(np.isscalar, part))
 
 
 def walls_from_map(
@@ -123,8 +107,8 @@ def walls_from_map(
 
     Parameters
     ----------
-    path : the YAML file, with image (PGM or PNG), resolution, origin, occupied_thresh, free_thresh, and, if
-        they differ from 0 and "trinary", negate and mode.
+    path : the YAML file, with image (PGM or PNG, of 8 bits, not transparent), resolution, origin,
+        occupied_thresh, free_thresh, and, if it is not 0, negate. Its mode is "trinary".
     simplify : as of `walls_from_grid`.
     unknown : True if unknown cells are solid as well.
 
@@ -139,8 +123,7 @@ def walls_from_map(
 
     Notes
     -----
-    Cells are read as map_server does. In mode "raw" a pixel of 0 to 100 is the occupancy in per cent, and
-    occupied from `occupied_thresh` on.
+    Cells are read as map_server does.
 
     Examples
     --------
@@ -156,66 +139,34 @@ def walls_from_map(
     ([4.0, 0.0], [10.0, 2.0])
     >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), walls=walls)
     """
-    what = "the map"
+    what, folder = "the map", Path(path).parent
     try:
-        entries = _check_entries(yaml.safe_load(read_small(Path(path))))
+        entries = {
+            "negate": 0,
+            "mode": "trinary",
+            **yaml.safe_load(read_small(Path(path))),
+        }
+        names = "resolution", "free_thresh", "occupied_thresh"
+        side, free, occupied = (check_number(name, entries[name]) for name in names)
+        origin = check_array("origin", entries["origin"], (3,))
+        below = f"from 0 to below occupied_thresh = {occupied}, which is at most 1"
+        require(0 <= free < occupied <= 1, "free_thresh", free, below)
+        require(entries["negate"] in (0, 1), "negate", entries["negate"], "0 or 1")
+        require(entries["mode"] == "trinary", "mode", entries["mode"], "'trinary'")
+        require(side > 0, "resolution", side, "positive")
         what = f"image {entries['image']!r}"
-        pixels = _read_picture(Path(path).parent / entries["image"], entries["mode"])
+        picture = Image.open(io.BytesIO(read_small(folder / entries["image"])))
+        require(picture.mode in _PICTURES, "its mode", picture.mode, f"of {_PICTURES}")
+        grey = np.asarray(picture.convert("L"), float)
     # whatever YAML, Pillow and NumPy say of a bad file
     except Exception as fault:
-        expected = "a YAML file of map_server with a PGM or PNG picture"
+        expected = "a YAML file of map_server, whole, with an opaque PGM or PNG picture"
         raise DataError(
             f"{printable(path)}: {what} cannot be read: {fault}; expected {expected}"
         ) from fault
-    solid, unclear = _classify_pixels(*pixels, entries)
-    cells = (solid | (unclear & unknown))[::-1]
-    side, origin = entries["resolution"], entries["origin"]
-    return walls_from_grid(cells, float(side), origin, simplify=simplify)
-
-
-def _check_entries(given: Any) -> dict[str, Any]:
-    """The entries of a map, with arrays of numbers; DataError if one is missing or cannot be used."""
-    entries = {"negate": 0, "mode": "trinary", **given}
-    missing = {"image", *_NUMBERS} - set(entries)
-    require(not missing, "a map", f"one without {sorted(missing)}", "complete")
-    for key, shape in _NUMBERS.items():
-        entries[key] = check_array(key, entries[key], shape)
-    free, occupied = entries["free_thresh"], entries["occupied_thresh"]
-    below = f"from 0 to below occupied_thresh = {occupied}, which is at most 1"
-    modes = "trinary", "scale", "raw"
-    for key, holds, expected in (
-        ("resolution", entries["resolution"] > 0, "a positive number of metres"),
-        ("free_thresh", 0 <= free < occupied <= 1, below),
-        ("negate", entries["negate"] in (0, 1), "0 or 1"),
-        ("mode", entries["mode"] in modes, " or ".join(map(repr, modes))),
-        ("image", isinstance(entries["image"], str), "the name of a picture"),
-    ):
-        require(holds, key, entries[key], expected)
-    return entries
-
-
-def _read_picture(path: Path, mode: str) -> tuple[Any, Any]:
-    """Grey of the pixels of a map, and True where they are transparent."""
-    picture = Image.open(io.BytesIO(read_small(path)))
-    n = picture.width * picture.height
-    fits = picture.mode in _EIGHT_BITS and n <= _MOST_PIXELS
-    expected = f"of 8 bits, and at most {_MOST_PIXELS} pixels"
-    require(fits, "it", (picture.mode, picture.size), expected)
-    grey, alpha = np.moveaxis(np.asarray(picture.convert("LA"), np.float32), -1, 0)
-    is_mixed = mode == "trinary" and picture.has_transparency_data
-    return (3 * grey + alpha) / 4 if is_mixed else grey, alpha < 255
-
-
-def _classify_pixels(
-    grey: Any, is_transparent: Any, entries: dict[str, Any]
-) -> tuple[Any, Any]:
-    """Which pixels of a map are occupied, and which are unknown."""
-    mode, occupied = entries["mode"], entries["occupied_thresh"]
-    if mode == "raw":
-        return (grey >= 100 * occupied) & (grey <= 100), grey > 100
     p = (grey if entries["negate"] else 255 - grey) / 255
-    is_between = (p >= entries["free_thresh"]) & (p <= occupied)
-    return p > occupied, is_between & (is_transparent | (mode == "trinary"))
+    is_solid = (p >= free) if unknown else (p > occupied)
+    return walls_from_grid(is_solid[::-1], side, origin, simplify=simplify)
 
 
 def walls_from_grid(
@@ -249,9 +200,9 @@ def walls_from_grid(
         check_number("resolution", resolution),
         check_number("simplify", simplify),
     )
-    require(side > 0, "resolution", side, "positive", SolverError)
-    require(within >= 0, "simplify", within, "at least 0", SolverError)
-    x, y, yaw = check_array("origin", origin, (3,)).tolist()
+    given, expected = (side, within), "positive, and at least 0"
+    require(side > 0 <= within, "resolution, simplify", given, expected, SolverError)
+    x, y, yaw = check_vector("origin", origin, 3)
     cells = np.asarray(occupied, bool)
     expected = "of shape (rows, columns)"
     require(cells.ndim == 2, "occupied", cells.shape, expected, SolverError)
