@@ -169,17 +169,6 @@ def test_encounters_agree_with_plain_loops_in_a_larger_room(crowd, known):
 # --- invariances -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("quarters", [1, 2, 3])
-def test_encounters_move_and_turn_with_the_world(crowd, known, quarters):
-    turn = np.linalg.matrix_power([[0, -1], [1, 0]], quarters)
-    moved = crowd.copy()
-    moved[["x", "y"]] = crowd[["x", "y"]].to_numpy() @ turn.T + [3.0, -7.0]
-    moved[["vx", "vy"]] = crowd[["vx", "vy"]].to_numpy() @ turn.T
-    assert_same_samples(
-        find_encounters(moved, square=Square(x=(-17, 23), y=(-27, 13))), known
-    )
-
-
 def test_mirror_reverses_the_sign_of_los_angle(crowd, known):
     mirrored = crowd.assign(y=-crowd["y"], vy=-crowd["vy"])
     expected = known.assign(los_angle=-known["los_angle"])

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.made_runs import make_log
 from studies.atlas import CANNOT_START, REFERENCE, SCENES, AtlasCell, run_atlas
 
 import szlib
-from szlib.simulation.log import SimulationLog
 from szlib.simulation.metrics import (
     MIN_RETREAT,
     STRATEGIES,
@@ -16,32 +16,15 @@ from szlib.simulation.metrics import (
 )
 
 
-def made(x, y=-1.6, *, held=False, **changes):
+def made(x, y=-1.6, *, held=False, **given):
     """A run along x, beside a person who stands at the origin, made by hand."""
-    n, s = len(x), szlib.MPCSettings()
-    scene = replace(
-        szlib.SCENARIOS["passing"],
-        start=np.array([x[0], y, 0.0, 0.0]),
-        goal=np.array([4.0, y]),
-    )
-    states = np.column_stack([x, np.full(n, y), np.gradient(x, s.dt), np.zeros(n)])
-    log = SimulationLog(
-        scenario=scene,
-        settings=s,
-        zones=(REFERENCE,),
-        states=states,
-        controls=np.zeros((n, 2)),
-        people=np.tile([0.0, 0.0, np.pi, 0.0, 0.0], (n, 1, 1)),
-        predicted=np.zeros((n, 0, 4)),
-        residual=np.full((n, 1, 2), 0.0 if held else 1.0),
-        status=np.full(n, "optimal"),
-        safe=np.ones(n, bool),
-        slack=np.zeros(n),
-        solve_time=np.zeros(n),
-        stuck=np.zeros(n),
-        arrival=n - 1,
-    )
-    return replace(log, **changes)
+    n, dt = len(x), szlib.MPCSettings().dt
+    start, goal = np.array([x[0], y, 0.0, 0.0]), np.array([4.0, y])
+    scene = replace(szlib.SCENARIOS["passing"], start=start, goal=goal)
+    states = np.column_stack([x, np.full(n, y), np.gradient(x, dt), np.zeros(n)])
+    people = np.tile([0.0, 0.0, np.pi, 0.0, 0.0], (n, 1, 1))
+    options = {"zone": REFERENCE, "residual": 0.0 if held else 1.0, "arrival": n - 1}
+    return make_log(scene, states, people, **options | given)
 
 
 AHEAD = np.linspace(-4, 4, 81)

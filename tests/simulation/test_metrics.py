@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.made_runs import make_log
 
 import szlib
 from szlib.control import STATUSES
@@ -12,48 +13,20 @@ from szlib.simulation.metrics import (
     find_yielding_steps,
     locate_along_course,
 )
-from szlib.simulation.robot_run import Run
 
-CIRCLE = szlib.Ellipse((0.0, 0.0), (0.7, 0.7))
 SETTINGS = szlib.MPCSettings()
 FAR_AWAY = (50.0, 50.0)
 
 
-def make_run(
-    states,
-    *people,
-    walls=(),
-    goal=(10.0, 0.0),
-    residual=1.0,
-    arrival=None,
-    **steps,
-):
+def make_run(states, *people, walls=(), goal=(10.0, 0.0), **steps):
     """A run in these states (n, 4) among people who stand at (x, y), or are at (n, 2); dt is 0.1 s."""
     states = np.array(states, float)
-    n = len(states)
-    placed = [np.broadcast_to(at, (n, 2)) for at in people]
-    scenario = szlib.Scenario(
-        "made", states[0], goal, tuple(szlib.Person((9, 9)) for _ in people), walls
-    )
-    given = {
-        "status": np.full(n, "optimal"),
-        "safe": np.ones(n, bool),
-        "slack": np.zeros(n),
-    }
-    return Run(
-        scenario,
-        SETTINGS,
-        (CIRCLE,) * len(people),
-        states,
-        np.zeros((n, 2)),
-        people=np.array([np.pad(at, ((0, 0), (0, 3))) for at in placed])
-        .reshape(-1, n, 5)
-        .swapaxes(0, 1),
-        predicted=np.zeros((n, 0, 4)),
-        residual=np.full((n, len(people) + len(walls), 2), residual),
-        arrival=arrival,
-        **{"solve_time": np.zeros(n), "stuck": np.zeros(n)} | given | steps,
-    )
+    around = np.zeros((len(states), len(people), 5))
+    for i, place in enumerate(people):
+        around[:, i, :2] = place
+    persons = tuple(szlib.Person((9, 9)) for _ in people)
+    scenario = szlib.Scenario("made", states[0], goal, persons, walls)
+    return make_log(scenario, states, around, **steps)
 
 
 def with_speeds(speeds):

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from helpers.made_runs import make_log
 
 import szlib
-from szlib.simulation.robot_run import Run
 
-CIRCLE = szlib.Ellipse((0.0, 0.0), (0.7, 0.7))
 SETTINGS = szlib.MPCSettings()
 ACTIVE, INACTIVE = 0.0, 1.0
 
@@ -15,27 +14,12 @@ def make_run(name, xy, *, arrives=True, residual=INACTIVE):
     """A run of the paper's scenario of this `name` along given positions, one a time step."""
     positions, dt = np.array(xy, float), SETTINGS.dt
     n, scenario = len(positions), szlib.SCENARIOS[name]
-    velocity = np.gradient(positions, dt, axis=0)
+    states = np.hstack([positions, np.gradient(positions, dt, axis=0)])
     persons = [person.after(k * dt) for k in range(n) for person in scenario.people]
-    people = np.array([(*p.position, p.heading, *p.velocity) for p in persons]).reshape(
-        n, -1, 5
-    )
-    return Run(
-        scenario,
-        SETTINGS,
-        (CIRCLE,),
-        np.hstack([positions, velocity]),
-        np.zeros((n, 2)),
-        people=people,
-        predicted=np.zeros((n, 0, 4)),
-        residual=np.full((n, people.shape[1] + len(scenario.walls), 2), residual),
-        status=np.full(n, "optimal"),
-        safe=np.ones(n, bool),
-        slack=np.zeros(n),
-        solve_time=np.zeros(n),
-        stuck=np.zeros(n),
-        arrival=n - 1 if arrives else None,
-    )
+    people = np.array([(*p.position, p.heading, *p.velocity) for p in persons])
+    arrival = n - 1 if arrives else None
+    around = people.reshape(n, -1, 5)
+    return make_log(scenario, states, around, residual=residual, arrival=arrival)
 
 
 def walk(*corners, speed=1.0):

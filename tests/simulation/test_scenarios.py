@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
+from helpers.made_runs import make_log
 
 import szlib
-from szlib.simulation.log import SimulationLog
 from szlib.simulation.metrics import find_avoidance_start, find_passing_side
 from szlib.zones.ellipses import BODY_RADIUS
 
@@ -219,26 +219,12 @@ def test_several_people_with_own_zones_and_velocities_among_several_walls():
 
 def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
     """A made-up run past a person at the origin, who is only looked at."""
-    scenario = szlib.Scenario(
-        "made", (-2.0, 0, 0, 0), (2.0, 0), (szlib.Person((0, 0), heading=0.0),)
-    )
-    states, settings = np.zeros((4, 4)), szlib.MPCSettings()
+    person = szlib.Person((0, 0), heading=0.0)
+    scenario = szlib.Scenario("made", (-2.0, 0, 0, 0), (2.0, 0), (person,))
+    states = np.zeros((4, 4))
     states[:, 0], states[:, 1] = x, y
-    plans = {
-        "predicted": np.zeros((4, 9, 4)),
-        "residual": np.zeros((4, 1, 2)),
-        "controls": np.zeros((4, 2)),
-    }
-    steps = {"status": np.full(4, "optimal"), "safe": np.ones(4, bool)}
-    times = {
-        "slack": np.zeros(4),
-        "solve_time": np.zeros(4),
-        "stuck": np.zeros(4),
-        "arrival": 3,
-    }
-    people = np.zeros((4, 1, 5))
-    return SimulationLog(
-        scenario, settings, (ZONE,), states, people=people, **plans, **steps, **times
+    return make_log(
+        scenario, states, np.zeros((4, 1, 5)), zone=ZONE, residual=0.0, arrival=3
     )
 
 

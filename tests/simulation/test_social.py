@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from helpers.made_runs import make_log
 from studies import social_metrics
 from studies.social_metrics import compute_replay_metrics, compute_social_metrics
 
 import szlib
-from szlib.simulation.log import SimulationLog
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 
@@ -14,31 +14,12 @@ ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 def made(states, people=(), walls=(), arrival=None, goal=(10.0, 0.0)):
     """A log of these states (n, 4), and of each person their (x, y, heading, vx, vy), (n, 5); dt is 0.1 s."""
     states = np.asarray(states, float)
-    n, known = len(states), [np.asarray(p, float) for p in people]
     scenario = szlib.Scenario("made", states[0], goal, walls=walls)
-    at = np.stack(known, axis=1) if known else np.zeros((n, 0, 5))
-    empty = {
-        "predicted": np.zeros((n, 0, 4)),
-        "residual": np.zeros((n, len(known) + len(walls), 0)),
-    }
-    steps = {
-        "status": np.full(n, ""),
-        "safe": np.zeros(n, bool),
-        "slack": np.full(n, np.nan),
-    }
-    return SimulationLog(
-        scenario,
-        szlib.MPCSettings(),
-        (ZONE,) * len(known),
-        states,
-        controls=np.zeros((n, 2)),
-        people=at,
-        solve_time=np.zeros(n),
-        stuck=np.zeros(n),
-        arrival=arrival,
-        has_safety_claims=False,
-        **empty,
-        **steps,
+    around = np.zeros((len(states), len(people), 5))
+    for i, person in enumerate(people):
+        around[:, i] = person
+    return make_log(
+        scenario, states, around, zone=ZONE, arrival=arrival, has_safety_claims=False
     )
 
 

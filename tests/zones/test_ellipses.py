@@ -1,13 +1,13 @@
 """Ellipses: their geometry, and a proof for each smallest one that no smaller one encloses the points."""
 
-from itertools import combinations, count
+from itertools import count
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import MPContext
-from scipy.optimize import minimize, nnls
+from scipy.optimize import nnls
 
 from szlib.core.errors import SzlibError, ZoneError
 from szlib.zones.ellipses import Ellipse, circle_around
@@ -18,8 +18,7 @@ from szlib.zones.enclosing_ellipse import (
 
 mp = MPContext()
 mp.dps = 50
-TINY = mp.mpf(10) ** -30
-AREA = 1e-9  # relative agreement in area with references of 50 digits
+AREA = 1e-9  # relative agreement in area with a bound of 50 digits
 INSIDE = 1e-12  # excess of the level that rounding explains
 
 
@@ -43,6 +42,9 @@ def flower(angles):
 
 
 CLOUDS = {
+    "three points": lambda rng: rng.normal(size=(3, 2)),
+    "four points": lambda rng: rng.normal(size=(4, 2)),
+    "seven points": lambda rng: rng.normal(size=(7, 2)),
     "normal": lambda rng: rng.normal(size=(200, 2)),
     "heavy tails": lambda rng: np.exp(rng.normal(size=(60, 2))),
     "cocircular": lambda rng: circle(rng.uniform(0, 2 * np.pi, 300)),
@@ -55,87 +57,12 @@ CLOUDS = {
 }  # fmt: skip
 
 
-# --- references of 50 digits -------------------------------------------------------------------------
+# --- a bound of 50 digits ------------------------------------------------------------------------------
 
 
 def exact(points):
     """Points as numbers of 50 digits: doubles are taken for exact."""
     return [(mp.mpf(float(x)), mp.mpf(float(y))) for x, y in points]
-
-
-def line(p, q):
-    return mp.matrix([p[1] - q[1], q[0] - p[0], p[0] * q[1] - q[0] * p[1]])
-
-
-def line_pair(p, q, r, s):
-    """Matrix of the conic that consists of the lines pq and rs."""
-    product = line(p, q) * line(r, s).T
-    return (product + product.T) / 2
-
-
-def conic_level(conic, point):
-    v = mp.matrix([*point, 1])
-    return (v.T * conic * v)[0]
-
-
-def as_ellipse(conic):
-    """(area, level function) of a conic v^T C v = 0, or None where it is no real ellipse."""
-    minor, full = mp.det(conic[:2, :2]), mp.det(conic)
-    if minor <= TINY or full * conic[0, 0] >= 0:
-        return None
-    # v^T C v there; level - 1 is v^T C v / |at_center|, positive outside
-    at_center = full / minor
-    return mp.pi * abs(at_center) / mp.sqrt(
-        minor
-    ), lambda p: 1 - conic_level(conic, p) / at_center
-
-
-def smallest_through(points):
-    """Conics through 3, 4 or 5 points, among them the smallest ellipse through them."""
-    if len(points) == 3:  # Steiner: the centroid, and twice the covariance
-        moment = mp.zeros(3)
-        for p in points:
-            v = mp.matrix([*p, 1])
-            moment += v * v.T / 3
-        return [moment**-1 - mp.diag([0, 0, 3])]
-    a, b, c, d = points[:4]
-    # a pencil of conics; both determinants are 0
-    first, second = (line_pair(a, b, c, d), line_pair(a, c, b, d))
-    if len(points) == 5:
-        return [
-            conic_level(second, points[4]) * first
-            - conic_level(first, points[4]) * second
-        ]
-    plus, minus = mp.det(first + second), mp.det(first - second)
-    # det(first + t second) = f1 t + f2 t^2
-    f1, f2 = ((plus - minus) / 2, (plus + minus) / 2)
-    # det of the 2 x 2 part = m0 + m1 t + m2 t^2
-    m0, m2 = (mp.det(first[:2, :2]), mp.det(second[:2, :2]))
-    m1 = mp.det((first + second)[:2, :2]) - m0 - m2
-    # area^2 ~ det^2 / minor^3 is stationary where t^3 = c2 t^2 + c1 t + c0: by its companion matrix
-    c2, c1, c0 = (
-        c / (2 * f2 * m2)
-        for c in (f2 * m1 - 4 * f1 * m2, 4 * f2 * m0 - f1 * m1, 2 * f1 * m0)
-    )
-    roots = mp.eig(
-        mp.matrix([[c2, c1, c0], [1, 0, 0], [0, 1, 0]]), left=False, right=False
-    )
-    return [first + mp.re(t) * second for t in roots if abs(mp.im(t)) < TINY]
-
-
-def smallest_area(points):
-    """Least area of the ellipses through 3, 4 or 5 of the points that enclose all of them."""
-    points = exact(points)
-    conics = [
-        c
-        for k in (3, 4, 5)
-        for some in combinations(points, k)
-        for c in smallest_through(some)
-    ]
-    ellipses = [e for e in map(as_ellipse, conics) if e]
-    return min(
-        area for area, level in ellipses if all(level(p) <= 1 + TINY for p in points)
-    )
 
 
 def proven_area(ellipse):
@@ -253,15 +180,6 @@ def test_circle_around_a_zone_is_the_smallest():
 # --- the smallest one around points ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("n", [3, 4, 5, 7])
-def test_area_is_the_least_of_all_candidates(n, seed):
-    points = np.random.default_rng([n, seed]).normal(size=(n, 2))
-    ellipse = minimum_enclosing_ellipse(points)
-    assert np.max(ellipse.level(points)) <= 1 + INSIDE
-    assert ellipse.area == pytest.approx(float(smallest_area(points)), rel=AREA)
-
-
 @pytest.mark.parametrize("cloud", CLOUDS)
 @pytest.mark.parametrize("aspect", [1, 1e3, 1e6])
 def test_no_smaller_ellipse_encloses_even_the_support(cloud, aspect):
@@ -346,60 +264,6 @@ def test_an_ellipse_is_recovered_from_points_on_it(truth):
     assert (
         truth.semi_axes[0] == truth.semi_axes[1]
         or abs(np.sin(ellipse.angle - truth.angle)) < 1e-9
-    )
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_triangle_has_its_steiner_circumellipse(seed):
-    a, b, c = triangle = np.random.default_rng([6, seed]).normal(size=(3, 2))
-    ellipse = minimum_enclosing_ellipse(triangle)
-    area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2
-    assert ellipse.area == pytest.approx(4 * np.pi / (3 * np.sqrt(3)) * area, rel=1e-12)
-    np.testing.assert_allclose(ellipse.center, triangle.mean(axis=0), atol=INSIDE)
-
-
-def test_a_rectangle_has_the_ellipse_of_its_own_proportions():
-    ellipse = minimum_enclosing_ellipse([(0, 0), (6, 0), (6, 2), (0, 2)])
-    np.testing.assert_allclose(ellipse.center, (3, 1), atol=INSIDE)
-    np.testing.assert_allclose(
-        ellipse.semi_axes, (3 * np.sqrt(2), np.sqrt(2)), rtol=INSIDE
-    )
-    assert ellipse.angle == pytest.approx(0, abs=INSIDE)
-
-
-@pytest.mark.parametrize("n", [3, 4, 5, 6, 7, 8, 12, 360, 1000])
-def test_a_regular_polygon_has_its_circumcircle_and_a_small_support(n):
-    ellipse = minimum_enclosing_ellipse(regular(n))
-    np.testing.assert_allclose(ellipse.semi_axes, (1, 1), rtol=INSIDE)
-    np.testing.assert_allclose(ellipse.center, (0, 0), atol=INSIDE)
-    assert 3 <= len(ellipse.support) <= 5
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_general_optimiser_finds_no_smaller_one(seed):
-    points = np.random.default_rng([7, seed]).normal(size=(12, 2))
-
-    def slack(
-        v,
-    ):  # |L^T p + t| <= 1 with L = [[e^v0, 0], [v2, e^v1]]; the area is pi e^-(v0 + v1)
-        x, y = points.T
-        return (
-            1
-            - (np.exp(v[0]) * x + v[2] * y + v[3]) ** 2
-            - (np.exp(v[1]) * y + v[4]) ** 2
-        )
-
-    wide = -np.log(np.max(np.linalg.norm(points, axis=1)))
-    found = minimize(
-        lambda v: -v[0] - v[1],
-        [wide, wide, 0, 0, 0],
-        method="SLSQP",
-        constraints={"type": "ineq", "fun": slack},
-        options={"ftol": 1e-10, "maxiter": 500},
-    )
-    assert found.success
-    assert minimum_enclosing_ellipse(points).area == pytest.approx(
-        np.pi * np.exp(found.fun), rel=1e-6
     )
 
 
