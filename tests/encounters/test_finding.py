@@ -171,7 +171,8 @@ def test_encounters_agree_with_plain_loops_in_a_larger_room(crowd, known):
 
 def test_mirror_reverses_the_sign_of_los_angle(crowd, known):
     mirrored = crowd.assign(y=-crowd["y"], vy=-crowd["vy"])
-    expected = known.assign(los_angle=-known["los_angle"])
+    angles = ["los_angle", "other_los_angle"]
+    expected = known.assign(**{name: -known[name] for name in angles})
     assert_same_samples(find_encounters(mirrored, square=ROOM), expected)
     assert (known["los_angle"] < 0).any()
 

@@ -19,9 +19,8 @@ def assert_same_samples(samples: pd.DataFrame, expected: pd.DataFrame) -> None:
         samples[labels].astype(str).to_numpy().tolist()
         == expected[labels].astype(str).to_numpy().tolist()
     )
-    for name in ("t", "distance", "speed"):
+    for name in ("t", "distance", "speed", "other_speed"):
         np.testing.assert_allclose(samples[name], expected[name], rtol=0, atol=1e-9)
-    turn = wrap_angle(
-        samples["los_angle"].to_numpy() - expected["los_angle"].to_numpy()
-    )
-    np.testing.assert_allclose(turn, 0, atol=1e-9)
+    for name in ("los_angle", "other_los_angle"):
+        turn = wrap_angle(samples[name].to_numpy() - expected[name].to_numpy())
+        np.testing.assert_allclose(turn, 0, atol=1e-9)
