@@ -78,16 +78,15 @@ def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -
     (x, y), velocity = after[:2] - now[:2], after[2:]
     fastest = float(np.abs(velocity).max())
     stop = fastest / s.a_max
-    piece = dt * max(1, ceil(ceil(stop / dt) / _MOST_PIECES))
+    piece = dt * max(1, ceil(stop / dt / _MOST_PIECES))
     times = piece * np.arange(ceil(stop / piece) + 1)
     speeds = (fastest - s.a_max * times).clip(0.0)
     gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / (fastest or 1.0)
     points = np.vstack([now[:2], after[:2], after[:2] + gone[:, None] * velocity])
-    bows = np.full(len(gone) + 1, 2**0.5 * s.a_max * piece**2 / 8)
-    bows[0] = hypot(*control) * dt**2 / 8
-    asides = np.zeros_like(bows)
     sideways = abs(x * control[1] - y * control[0]) / (hypot(x, y) or 1.0)
-    asides[0] = sideways * dt**2 / 8
+    bows = 2**0.5 * s.a_max * piece**2 / 8 * np.ones(len(times))
+    bows[0] = hypot(*control) * dt**2 / 8
+    asides = np.append(sideways * dt**2 / 8, 0.0 * gone)
     return Path(points, np.append(0.0, dt + times), bows, asides)
 
 
@@ -175,26 +174,22 @@ class Controller:
         """Raise SolverError if no run can start from `state` to `goal` among `people`; here: never."""
 
 
-class _Adapter(Controller):
-    """A controller made of any object with `reset` and `step`."""
-
-    def __init__(self, controller: Any) -> None:
-        for name in ("reset", "step", "zone", "walls", "obstacles", "robot"):
-            if getattr(controller, name, None) is not None:
-                setattr(self, name, getattr(controller, name))
-        if isinstance(settings := getattr(controller, "settings", None), MPCSettings):
-            self.settings = settings
-
-
 def as_controller(controller: Any) -> Controller:
     """Return `controller` as a `Controller`, with the defaults of what it lacks.
 
     Parameters
     ----------
     controller : a `Controller`, or any object with `reset` and `step`; of its attributes `settings`, `zone`,
-        `walls` and `robot` those that exist are used.
+        `walls`, `obstacles` and `robot` those that exist are used: as of a `Controller`.
     """
-    return controller if isinstance(controller, Controller) else _Adapter(controller)
+    if isinstance(controller, Controller):
+        return controller
+    found = Controller()
+    for name in ("reset", "step", "settings", "zone", "walls", "obstacles", "robot"):
+        value = getattr(controller, name, None)
+        if value is not None:
+            setattr(found, name, value)
+    return found
 
 
 OLDEST_STATE = 1.0
@@ -231,7 +226,7 @@ class StepClock:
     def __init__(self, dt: float) -> None:
         self.now, self.has_begun = 0.0, False
         self._dt, self._elapsed, self._back = dt, dt, 0.0
-        n_held = max(RATE_STEPS, 2 * ceil(OLDEST_STATE / dt))
+        n_held = 2 * ceil(OLDEST_STATE / dt)
         self._held = deque[tuple[Array, float]](maxlen=n_held)
         self._periods, self._called = deque[float](maxlen=RATE_STEPS), 0.0
         self._goal, self._nearest = (inf, inf), inf
@@ -239,22 +234,19 @@ class StepClock:
 
     def tick(self, now: float | None, stamps: ArrayLike | None) -> None:
         """Begin a step at the time `now` [s]; None: `dt` after the last, which no `stamps` can refer to."""
-        if now is None and stamps is not None:
-            raise SolverError(
-                "stamps need `now`, the time of the robot's state by the same clock; got none"
-            )
+        is_known, expected = now is not None, "given with `stamps`, by the same clock"
+        require(is_known or stamps is None, "now", now, expected, SolverError)
         last, called = self.now, perf_counter()
         if now is not None:
             self.now = check_finite("now", now)
         elif self.has_begun:
             self.now += self._dt
-        self._back = max(0.0, last - self.now) * self.has_begun
         if self.has_begun:
+            self._back = max(0.0, last - self.now)
             self._elapsed = self._dt if self._back else self.now - last
             self._held.append((self._control, self._elapsed))
-            period = self._elapsed if now is not None else called - self._called
-            self._periods.append(period)
-        self._called, self._is_timed = called, now is None
+            self._periods.append(self._elapsed if is_known else called - self._called)
+        self._called, self._is_timed = called, not is_known
 
     def hold(self, control: Array) -> None:
         """End a step: the robot holds `control` until the next one."""
@@ -264,14 +256,12 @@ class StepClock:
         self, robot: Robot, own: Array, age: float, at_first: Array
     ) -> Array:
         """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
-        left, spans = age, list[tuple[Array, float]]()
-        expected = f"0 to {OLDEST_STATE:g} s"
-        require(0 <= left <= OLDEST_STATE, "state_age", age, expected, SolverError)
-        while left > 0 and len(spans) < len(self._held):
-            control, held = self._held[-1 - len(spans)]
-            spans.append((control, min(held, left)))
-            left -= spans[-1][1]
-        for control, seconds in reversed([*spans, (at_first, left)]):
+        spans, expected = list[tuple[Array, float]](), f"0 to {OLDEST_STATE:g} s"
+        require(0 <= age <= OLDEST_STATE, "state_age", age, expected, SolverError)
+        for control, held in reversed(self._held):
+            spans.append((control, min(held, age)))
+            age -= spans[-1][1]
+        for control, seconds in reversed([*spans, (at_first, age)]):
             own = robot.advance(own, control, seconds) if seconds > 0 else own
         return own
 
@@ -294,7 +284,7 @@ class StepClock:
 
     def describe(self, stamps: ArrayLike | None, memory: float) -> str:
         """What is wrong with the times of this step, with the `stamps` of people and a tracker's `memory`."""
-        found = []
+        found, periods, dt = list[str](), self._periods, self._dt
         if self._back:
             found.append(
                 f"the clock went back by {self._back:.3g} s; nobody is forgotten"
@@ -305,24 +295,14 @@ class StepClock:
                 found.append(
                     f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s only"
                 )
-        if self._has_another_rate():
-            period = median_low(self._periods)
-            found.append(
-                f"steps come every {period:.3g} s, not every dt = {self._dt:g} s: gamma is per dt"
-                + "; give `now`, or call every dt" * self._is_timed
-            )
+        low, high = REAL_TIME if self._is_timed else (0.0, inf)
+        if len(periods) == RATE_STEPS and low <= periods[-1] / dt <= high:
+            period = median_low(periods)
+            off = min(abs(period - dt), abs(periods[-1] - dt))
+            is_even = max(periods) - min(periods) < RATE_ERROR * period
+            if off > RATE_ERROR * dt and (is_even or not self._is_timed):
+                found.append(
+                    f"steps come every {period:.3g} s, not every dt = {dt:g} s: gamma is per dt"
+                    + "; give `now`, or call every dt" * self._is_timed
+                )
         return "; ".join(found)
-
-    def _has_another_rate(self) -> bool:
-        """True if most of the last steps came at another interval than dt."""
-        periods, dt = self._periods, self._dt
-        if len(periods) < RATE_STEPS or abs(periods[-1] - dt) <= RATE_ERROR * dt:
-            return False
-        low, high = REAL_TIME
-        if self._is_timed and not low * dt <= periods[-1] <= high * dt:
-            return False
-        off = [each for each in periods if abs(each - dt) > RATE_ERROR * dt]
-        if not self._is_timed:
-            return 2 * len(off) > RATE_STEPS
-        is_regular = max(periods) - min(periods) < RATE_ERROR * median_low(periods)
-        return len(off) == RATE_STEPS and is_regular

@@ -345,7 +345,7 @@ def test_with_unknown_people_the_target_is_where_full_braking_ends():
             {"stamps": [1, 2], "now": 3},
             r"stamps must be one time .* \[1, 2\]",
         ),
-        ([[0, 0, 0, 0]], {"stamps": 1.0}, "stamps need `now`"),
+        ([[0, 0, 0, 0]], {"stamps": 1.0}, "now must be given with `stamps`"),
         ([[0, 0, 0, 0]], {"now": np.nan}, "now must be a finite number"),
     ],
 )
