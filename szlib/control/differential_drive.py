@@ -43,7 +43,7 @@ follow with dv/dt = (acceleration of p along e) + L omega^2, so by up to V^2 / L
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from cmath import phase, rect
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
@@ -52,13 +52,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.checks import Array, check_array, check_number, check_vector
+from ..core.checks import Array, check_array, check_number, check_vector, require
 from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
-from .obstacles import Obstacle, Obstacles, Path
-from .people import STANDING_SPEED, SpeedZone, Tracker
-from .problem import build_horizon
+from .obstacles import Path
+from .people import SpeedZone
 from .settings import MPCSettings
 from .step import Scene, Step
 from .verification import PIECES, Sampled
@@ -105,10 +104,10 @@ class Unicycle:
 
     def advance(self, own: Array, control: Array, dt: float) -> Array:
         """The state after `own` when `control`, (v, omega), was held for `dt` [s]: exact, along an arc."""
-        (x, y, theta, _, _), (v, omega) = own.tolist(), control.tolist()
+        (x, y, theta, *_), (v, omega) = own.tolist(), control.tolist()
         half = omega * dt / 2
-        chord = v * dt * float(np.sinc(half / pi))
-        x, y = x + chord * cos(theta + half), y + chord * sin(theta + half)
+        move = rect(v * dt * float(np.sinc(half / pi)), theta + half)
+        x, y = x + move.real, y + move.imag
         return np.array([x, y, (theta + 2 * half + pi) % (2 * pi) - pi, v, omega])
 
 
@@ -127,25 +126,26 @@ class _Wheels:
     robot: Unicycle = Unicycle()
 
     def follow(
-        self, own: Array, points: Array, lasts: Iterable[float]
+        self, own: Array, points: Array, times: ArrayLike
     ) -> tuple[Array, Array]:
         """States of the disc, shape (k+1, 4), and commands, shape (k, 2).
 
         Parameters
         ----------
         own : state of the robot, (x, y, theta, v, omega).
-        points : where the point is to be, one after the other, shape (k, 2) [m].
-        lasts : time to each of them [s].
+        points : where the point is now, and is to be, one after the other, shape (k+1, 2) [m].
+        times : when it is to be there, shape (k+1,) [s].
         """
         at, states, controls = own, [self.robot.body(own)], list[Array]()
-        for (px, py), dt in zip(points.tolist(), lasts, strict=True):
-            x, y, theta = at[:3].tolist()
-            c, s = cos(theta), sin(theta)
-            dx, dy = px - x - self.ahead * c, py - y - self.ahead * s
-            share = min(1.0, self.v_max * dt / (hypot(dx, dy) or 1.0))
-            xi, eta = share * (dx * c + dy * s), share * (dy * c - dx * s)
-            beta = atan2(eta, 2 * self.ahead + xi)
-            way = (xi * cos(beta) + eta * sin(beta)) / float(np.sinc(beta / pi))
+        lasts = np.diff(times).tolist()
+        for (px, py), dt in zip(points[1:].tolist(), lasts, strict=True):
+            x, y, theta, *_ = at.tolist()
+            away = complex(px - x, py - y) - rect(self.ahead, theta)
+            share = min(1.0, self.v_max * dt / (hypot(away.real, away.imag) or 1.0))
+            # xi + i eta
+            move = share * (away * rect(1.0, -theta))
+            beta = phase(2 * self.ahead + move)
+            way = (move * rect(1.0, -beta)).real / float(np.sinc(beta / pi))
             controls.append(np.array([way / dt, 2 * beta / dt]))
             at = self.robot.advance(at, controls[-1], dt)
             states.append(self.robot.body(at))
@@ -176,8 +176,8 @@ class DriveStep(Step):
     @cached_property
     def predicted(self) -> Array:
         """(x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s]."""
-        lasts = np.diff(self.asked.settings.times).tolist()
-        states, _ = self.wheels.follow(self.own, self.planned[1:, :2], lasts)
+        times = self.asked.settings.times
+        states, _ = self.wheels.follow(self.own, self.planned[:, :2], times)
         return states
 
     @property
@@ -186,15 +186,14 @@ class DriveStep(Step):
 
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, whose wheels follow the point: arcs, of complex numbers."""
-        points, lasts = way.points[::PIECES], np.diff(way.times[::PIECES])
-        _, commands = self.wheels.follow(self.own, points[1:], lasts.tolist())
+        points, times = way.points[::PIECES], way.times[::PIECES]
+        _, commands = self.wheels.follow(self.own, points, times)
         commands[0] = self.control
-        at, theta = np.array([complex(*self.own[:2])]), self.own[2]
-        for (v, omega), dt in zip(commands, lasts, strict=True):
-            turned = 1j * (omega or 1e-9) * dt
-            shares = np.expm1(turned * np.arange(1, PIECES + 1) / PIECES) / turned
-            at = np.append(at, at[-1] + v * dt * np.exp(1j * theta) * shares)
-            theta += omega * dt
+        dt, (v, omega) = np.diff(way.times), np.repeat(commands, PIECES, axis=0).T
+        turned = np.append(self.own[2], omega * dt).cumsum()
+        chords = v * dt * np.sinc(omega * dt / 2 / pi)
+        moves = chords * np.exp(1j * (turned[:-1] + turned[1:]) / 2)
+        at = np.append(complex(*self.own[:2]), moves).cumsum()
         return way._replace(points=np.column_stack([at.real, at.imag]))
 
 
@@ -243,36 +242,28 @@ class DifferentialDrive(MPCCBF):
     True
     """
 
-    robot: Unicycle
+    robot: Unicycle = Unicycle()
 
     def __init__(
         self,
         zone: Ellipse | SpeedZone,
         *,
-        walls: Any = (),
-        obstacles: Iterable[Obstacle] = (),
-        settings: MPCSettings | None = None,
         omega_max: float = 4.0,
         ahead: float | None = None,
-        tracker: Tracker | None = None,
+        **given: Any,
     ) -> None:
-        self.robot = Unicycle()
         self.omega_max = check_number("omega_max", omega_max)
         self.ahead = inf if ahead is None else check_number("ahead", ahead)
-        given = {"walls": walls, "obstacles": obstacles, "tracker": tracker}
-        super().__init__(zone, settings=settings, **given)
+        super().__init__(zone, **given)
 
     def _plan_with(self, s: MPCSettings) -> MPCSettings:
         """Settings of the point ahead of the axle."""
-        if not 0 < self.omega_max * s.dt < pi:
-            raise SolverError(
-                f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {self.omega_max}"
-            )
-        if not self.ahead > 0:
-            raise SolverError(
-                f"ahead must be positive: the axle itself cannot move sideways; got {self.ahead}"
-            )
-        turn = 2 * sin(self.omega_max * s.dt / 2) / s.dt
+        turned, ahead = self.omega_max * s.dt, self.ahead
+        expected = f"in (0, pi/dt) = (0, {pi / s.dt:g})"
+        require(0 < turned < pi, "omega_max", self.omega_max, expected, SolverError)
+        expected = "positive, because the axle itself cannot move sideways"
+        require(ahead > 0, "ahead", ahead, expected, SolverError)
+        turn = 2 * sin(turned / 2) / s.dt
         if self.ahead == inf:
             self.ahead = s.v_max / turn
         self.v_max = min(s.v_max, self.ahead * turn)
@@ -287,34 +278,37 @@ class DifferentialDrive(MPCCBF):
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
         super().reset()
-        self._command, self._turns = list[float](), False
+        self._command, self._turns = np.full(2, np.nan), False
         self._seen: Scene | None = None
-        self._planned_velocity = [0.0, 0.0]
+        self._planned_velocity = np.zeros(2)
 
     def _locate(
         self, state: ArrayLike, goal: Point, age: float
     ) -> tuple[list[float], Point]:
         """State and goal of the point, from those of the axle's middle."""
         old = self._read_state(state)
-        self._own = self._clock.bring_forward(self.robot, old, age, old[3:])
-        x, y, theta, *speeds = self._own.tolist()
-        turn = self._find_turn([x, y, theta], np.array(goal))
+        self._own = own = self._clock.bring_forward(self.robot, old, age, old[3:])
+        x, y, theta, v, omega = own.tolist()
+        turn = self._find_turn((x, y, theta), goal)
         # of the axle: it turns where it stands, or drives to the goal
         gx, gy = (x, y) if turn else goal
-        c, s = self.ahead * cos(theta), self.ahead * sin(theta)
-        to_x, to_y = self.ahead * cos(theta + turn), self.ahead * sin(theta + turn)
-        velocity = self._find_velocity(theta, *speeds)
-        return [x + c, y + s, *velocity], (gx + to_x, gy + to_y)
+        here, there = rect(self.ahead, theta), rect(self.ahead, theta + turn)
+        velocity = self._planned_velocity.tolist()
+        deviation = hypot(*((own[3:] - self._command) * (1.0, self.ahead)))
+        # the robot was stopped or pushed, or begins
+        if not deviation <= self.settings.a_max * self.settings.dt:
+            true = rect(1.0, theta) * complex(v, self.ahead * omega)
+            velocity = [true.real, true.imag]
+        point = [x + here.real, y + here.imag, *velocity]
+        return point, (gx + there.real, gy + there.imag)
 
     def _finish(self, **found: Any) -> DriveStep:
         """The command with which the wheels follow the point."""
-        asked = self._seen = found.pop("scene")
-        planned = build_horizon(self._s).states(np.array(asked.state), found["inputs"])
-        _, (control,) = self._wheels.follow(self._own, planned[1:2, :2], [self._s.dt])
-        self._command, self._planned_velocity = (
-            control.tolist(),
-            planned[1, 2:].tolist(),
-        )
+        point = Step(**found)
+        asked = self._seen = point.scene
+        planned, times = point.planned[:2], self._s.times[:2]
+        _, (control,) = self._wheels.follow(self._own, planned[:, :2], times)
+        self._command, self._planned_velocity = control, planned[1, 2:]
         state = self.robot.body(self._own)
         scene = self._make_scene(state, asked.goal, asked.tracked)
         found |= {"control": control, "scene": scene, "of_point": asked}
@@ -329,58 +323,37 @@ class DifferentialDrive(MPCCBF):
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc whose wheels follow the point on a `path`."""
-        lasts = np.diff(path.times)
-        centres, commands = self._wheels.follow(
-            self._own, path.points[1:], lasts.tolist()
-        )
-        bows = np.abs(commands.prod(axis=1)) * lasts**2 / 8
+        centres, commands = self._wheels.follow(self._own, path.points, path.times)
+        bows = np.abs(commands.prod(axis=1)) * np.diff(path.times) ** 2 / 8
         return Path(centres[:, :2], path.times, bows, bows)
 
     def _read_state(self, state: ArrayLike) -> Array:
         """(x, y, theta, v, omega) from a `state` with or without the speeds."""
-        size = np.asarray(state, object).size
-        if size not in (3, 5):
-            raise SolverError(
-                "state must be (x, y, theta) or (x, y, theta, v, omega) of the axle's middle; got "
-                f"{size} numbers: {state!r}"
-            )
-        own = check_array("state", state, (size,)).tolist()
-        return np.array([*own[:3], *(own[3:] or self._command or (0.0, 0.0))])
+        own = check_array("state", state, (...,))
+        expected = "(x, y, theta) or (x, y, theta, v, omega) of the axle's middle"
+        require(own.shape in ((3,), (5,)), "state", state, expected, SolverError)
+        if len(own) == 3:
+            own = np.append(own, np.nan_to_num(self._command))
+        return own
 
-    def _find_turn(self, own: list[float], goal: Array) -> float:
+    def _find_turn(self, own: tuple[float, ...], goal: Point) -> float:
         """Angle by which the robot turns where it stands, close to its `goal` [rad]; 0: it drives on.
 
         It turns if the point ahead could not be where it is to be when the disc is at the goal, because of a
         wall or a person who stands. It turns its back to the goal, or as far as the point could be there
         then, and goes backwards.
         """
-        (x, y, theta), (gx, gy), scene = own, goal.tolist(), self._seen
+        (x, y, theta), (gx, gy), scene = own, goal, self._seen
         reach = (1.5 if self._turns else 1.0) * _NEAR * self.ahead
         if scene is None or hypot(gx - x, gy - y) > reach:
             self._turns = False
             return 0.0
         headings = np.array([theta, *(atan2(y - gy, x - gx) + _TURNS)])
         px, py = gx + self.ahead * np.cos(headings), gy + self.ahead * np.sin(headings)
-        standing = (
-            zone
-            for zone, person in zip(scene.zones.items, scene.people, strict=True)
-            if hypot(*person.velocity) < STANDING_SPEED
-        )
-        h = Obstacles.of(standing, self._s).joined(scene.fixed).h(px, py)
+        h = scene.find_standing_h(px, py)
         free = h.min(axis=0, initial=inf) >= _FREE
         turn = remainder(float(headings[1:][free[1:].argmax()]) - theta, 2 * pi)
         self._turns = bool(free[1:].any()) and (
             abs(turn) > _ALIGNED if self._turns else not free[0]
         )
         return max(-_TURN, min(turn, _TURN)) if self._turns else 0.0
-
-    def _find_velocity(self, theta: float, v: float, omega: float) -> list[float]:
-        """Velocity of the point: as planned, unless the robot does not follow its command."""
-        if self._command:
-            deviation = hypot(
-                v - self._command[0], self.ahead * (omega - self._command[1])
-            )
-            if deviation <= self.settings.a_max * self.settings.dt:
-                return self._planned_velocity
-        c, s, sideways = cos(theta), sin(theta), self.ahead * omega
-        return [v * c - sideways * s, v * s + sideways * c]

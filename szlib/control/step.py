@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import dist, hypot, inf
-from typing import ClassVar, Literal, NamedTuple, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 import shapely
@@ -71,13 +71,17 @@ class Scene(NamedTuple):
         """The bodies of people."""
         return find_bodies(self.zones, self.settings)
 
-    @property
-    def h_of_goal(self) -> Array:
-        """Barriers at the goal, shape (obstacles,) [m]; inf for people who walk: they leave it free."""
-        h = self.barriers.h(*self.goal)
+    def find_standing_h(self, x: Any, y: Any) -> Array:
+        """Barriers at places, shape (obstacles, ...) [m]; inf for people who walk: they leave it free."""
+        h = self.barriers.h(x, y)
         walk = [hypot(*each.velocity) >= STANDING_SPEED for each in self.people]
         h[: len(walk)][walk] = inf
         return h
+
+    @property
+    def h_of_goal(self) -> Array:
+        """Barriers at the goal, shape (obstacles,) [m]; inf for people who walk."""
+        return self.find_standing_h(*self.goal)
 
     @property
     def goal_blocked(self) -> bool:
