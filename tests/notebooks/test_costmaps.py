@@ -81,29 +81,6 @@ def test_rows_are_y_and_columns_are_x():
     assert costs.ravel()[9 * 50 + 19] == 100
 
 
-def test_costmap_moves_and_rotates_with_the_people():
-    rng = np.random.default_rng(1)
-    people = np.column_stack([rng.uniform(-2, 2, (4, 2)), rng.uniform(-1, 1, (4, 2))])
-    grid = Grid((-3.2, -3.2), 0.1, (64, 64))
-    costs = draw_costmap(ZONE, people, grid)
-    moved = draw_costmap(
-        ZONE,
-        people + np.array([0.3, -0.5, 0, 0]),
-        Grid((-2.9, -3.7), 0.1, (64, 64)),
-    )
-    turned = draw_costmap(ZONE, people[:, [1, 0, 3, 2]] * [-1, 1, -1, 1], grid)
-    # a cell whose cost is a half may round either way
-    assert np.abs(moved - costs).max() <= 1
-    assert np.abs(turned - costs.T[:, ::-1]).max() <= 1
-    assert np.array_equal(draw_costmap(ZONE, people[::-1], grid), costs)
-    assert np.array_equal(
-        np.maximum(
-            draw_costmap(ZONE, people[:2], grid), draw_costmap(ZONE, people[2:], grid)
-        ),
-        costs,
-    )
-
-
 def test_person_without_heading_gets_the_circle():
     circle = circle_around(ZONE)
     standing = draw_costmap(ZONE, [[0.0, 0.0, 0.0, 0.0]], GRID)

@@ -196,18 +196,6 @@ def test_between_corner_angles_the_boundary_is_that_of_one_edge():
         np.testing.assert_allclose(basis @ wave, inverse, rtol=1e-6)
 
 
-@pytest.mark.parametrize("r_max", [2.0, 3.0])
-def test_no_sample_is_within_the_zone(r_max):
-    points = cloud(3)
-    section = slice_hull(points, 1.0, r_max=r_max)
-    same = np.array(
-        [p for p in points if within_hull(points, np.array([p[0], p[1], 1.0]))]
-    )
-    distance = r_max - np.hypot(same[:, 0], same[:, 1])
-    zone = r_max - section.reach(np.arctan2(same[:, 1], same[:, 0]))
-    assert (distance >= zone - 1e-9).all()
-
-
 # --- the origin outside ------------------------------------------------------------------------------
 
 
