@@ -77,10 +77,9 @@ def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -
     after = advance(now, control, dt)
     (x, y), velocity = after[:2] - now[:2], after[2:]
     fastest = float(np.abs(velocity).max())
-    stop = fastest / s.a_max
-    piece = dt * max(1, ceil(stop / dt / _MOST_PIECES))
-    times = piece * np.arange(ceil(stop / piece) + 1)
-    speeds = (fastest - s.a_max * times).clip(0.0)
+    piece = dt * max(1, ceil(fastest / s.a_max / dt / _MOST_PIECES))
+    speeds = np.append(np.arange(fastest, 0.0, -s.a_max * piece), 0.0)
+    times = piece * np.arange(len(speeds))
     gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / (fastest or 1.0)
     points = np.vstack([now[:2], after[:2], after[:2] + gone[:, None] * velocity])
     sideways = abs(x * control[1] - y * control[0]) / (hypot(x, y) or 1.0)

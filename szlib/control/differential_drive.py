@@ -272,8 +272,8 @@ class DifferentialDrive(MPCCBF):
         radius = s.r_robot + (s.eps + self.ahead + self.chord_error)
         self.goal_clearance = radius + self.ahead
         self._wheels = _Wheels(self.ahead, self.v_max)
-        grown = replace(s, r_robot=radius, eps=0.0, v_max=self.v_max)
-        return replace(grown, margin="euclidean")
+        v_max = self.v_max
+        return replace(s, r_robot=radius, eps=0.0, v_max=v_max, margin="euclidean")
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
@@ -286,7 +286,11 @@ class DifferentialDrive(MPCCBF):
         self, state: ArrayLike, goal: Point, age: float
     ) -> tuple[list[float], Point]:
         """State and goal of the point, from those of the axle's middle."""
-        old = self._read_state(state)
+        old = check_array("state", state, (...,))
+        expected = "(x, y, theta) or (x, y, theta, v, omega) of the axle's middle"
+        require(old.shape in ((3,), (5,)), "state", state, expected, SolverError)
+        if len(old) == 3:
+            old = np.append(old, np.nan_to_num(self._command))
         self._own = own = self._clock.bring_forward(self.robot, old, age, old[3:])
         x, y, theta, v, omega = own.tolist()
         turn = self._find_turn((x, y, theta), goal)
@@ -308,7 +312,7 @@ class DifferentialDrive(MPCCBF):
         asked = self._seen = point.scene
         planned, times = point.planned[:2], self._s.times[:2]
         _, (control,) = self._wheels.follow(self._own, planned[:, :2], times)
-        self._command, self._planned_velocity = control, planned[1, 2:]
+        self._command, self._planned_velocity = control.copy(), planned[1, 2:]
         state = self.robot.body(self._own)
         scene = self._make_scene(state, asked.goal, asked.tracked)
         found |= {"control": control, "scene": scene, "of_point": asked}
@@ -326,15 +330,6 @@ class DifferentialDrive(MPCCBF):
         centres, commands = self._wheels.follow(self._own, path.points, path.times)
         bows = np.abs(commands.prod(axis=1)) * np.diff(path.times) ** 2 / 8
         return Path(centres[:, :2], path.times, bows, bows)
-
-    def _read_state(self, state: ArrayLike) -> Array:
-        """(x, y, theta, v, omega) from a `state` with or without the speeds."""
-        own = check_array("state", state, (...,))
-        expected = "(x, y, theta) or (x, y, theta, v, omega) of the axle's middle"
-        require(own.shape in ((3,), (5,)), "state", state, expected, SolverError)
-        if len(own) == 3:
-            own = np.append(own, np.nan_to_num(self._command))
-        return own
 
     def _find_turn(self, own: tuple[float, ...], goal: Point) -> float:
         """Angle by which the robot turns where it stands, close to its `goal` [rad]; 0: it drives on.

@@ -10,8 +10,7 @@ A sensor is noisy and late, and loses people. By the ids of people,
                 more than `memory` before or after now. The last known state of the same id takes their place,
                 moved forward; people without such a state are *unknown*
     late        measurements, older than what is known of the same id, are ignored
-    ids         that are NaN, or given to two people at once, tell nothing. If a person is more than
-                `SAME_PERSON` from where the same id is expected, they are somebody else
+    ids         that are NaN, or given to two people at once, tell nothing
     lost        people give their place to a person with a new id who is within `SAME_PLACE` of where they are
                 expected: a sensor that changes ids makes nobody appear twice
     the clock   may go back: that step is taken to be as long as the one before, and nobody is forgotten
@@ -277,8 +276,6 @@ class Person:
         return moved
 
 
-SAME_PERSON = 2.0
-"""Distance from the expected position up to which the same id means the same person [m] (assumed)."""
 SAME_PLACE = 0.5
 """Distance from where a lost person is expected up to which a new id means the same person [m] (assumed)."""
 _LastSeen = tuple[Person, float]  # a person as last seen, and when [s]
@@ -386,8 +383,12 @@ class Tracker:
                 name = None
             last = self._last_seen.get(name)
             if is_usable and abs(now - time) <= self.memory:
-                last = self._update(person, name, time, given)
-                if name is not None:
+                if name is None:
+                    last = person, time
+                else:
+                    last = last or self._find_lost(person, time, given)
+                    if last is None or time >= last[1]:
+                        last = self._identify(person, name, last), time
                     self._last_seen[name] = last
             else:
                 rejected += 1
@@ -420,51 +421,36 @@ class Tracker:
         if isinstance(each, Person):
             return each, True
         x, y, vx, vy = map(float, each)
-        speed = hypot(vx, vy)
         if not hypot(x, y) <= LARGEST:
             return None, False
-        if not speed <= LARGEST:
-            return Person((x, y), id=name), False
-        is_slow = speed < self.walking_speed
-        return Person((x, y), (vx, vy), id=name, heading_unknown=is_slow), True
+        speed = hypot(vx, vy)
+        is_usable, is_slow = speed <= LARGEST, not speed >= self.walking_speed
+        velocity = (vx, vy) if is_usable else (0.0, 0.0)
+        return Person((x, y), velocity, id=name, heading_unknown=is_slow), is_usable
 
-    def _update(
-        self, person: Person, name: Hashable, time: float, given: Counter[Hashable]
-    ) -> _LastSeen:
-        """What is known of a `person` who was measured."""
-        if name is None:
-            return person, time
-        last = self._recall(name, person.position, time, given)
-        if last and time < last[1]:
-            return last
+    def _find_lost(
+        self, person: Person, time: float, given: Counter[Hashable]
+    ) -> _LastSeen | None:
+        """What is known of a `person` whose id is new, by their place; it is not theirs any more."""
+        away = {
+            name: dist(person.position, lost.after(time - then).position)
+            for name, (lost, then) in self._last_seen.items()
+            if name not in given
+        }
+        nearest = min(away, key=away.__getitem__, default=None)
+        is_same = away.get(nearest, inf) <= SAME_PLACE
+        return self._last_seen.pop(nearest) if is_same else None
+
+    def _identify(
+        self, person: Person, name: Hashable, last: _LastSeen | None
+    ) -> Person:
+        """A measured `person` with their id, and with the heading that is known of them."""
         heading, (vx, vy) = person.heading, person.velocity
         is_slow = hypot(vx, vy) < self.walking_speed and not person.stands
         if heading is None or (is_slow and heading == atan2(vy, vx)):
             heading = last[0].heading if last else None
         is_unknown = heading is None
-        seen = replace(person, id=name, heading=heading, heading_unknown=is_unknown)
-        return seen, time
-
-    def _recall(
-        self,
-        name: Hashable,
-        place: tuple[float, float],
-        time: float,
-        given: Counter[Hashable],
-    ) -> _LastSeen | None:
-        """What is known of a person at a `place`: by their id, or by their place if the id is new."""
-        last, away = self._last_seen.get(name), dict[Hashable, float]()
-        lost = [each for each in self._last_seen if each not in given]
-        for each in [name] if last else lost:
-            person, then = self._last_seen[each]
-            away[each] = dist(place, person.after(time - then).position)
-        nearest = min(away, key=away.__getitem__, default=None)
-        is_same = away.get(nearest, inf) <= (SAME_PERSON if last else SAME_PLACE)
-        if last and not is_same:
-            # somebody else has this id now; the person may be hidden
-            self._last_seen[Tracker, name] = last
-            return None
-        return self._last_seen.pop(nearest) if is_same and not last else last
+        return replace(person, id=name, heading=heading, heading_unknown=is_unknown)
 
 
 def check_finite(name: str, value: Any, least: float = -1e300) -> float:

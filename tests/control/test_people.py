@@ -134,21 +134,6 @@ def test_an_id_that_two_people_have_at_once_is_no_id():
     assert tracker.see([[np.nan] * 4, rows[1]], ids=["a", "a"], now=0.6).unknown == 1
 
 
-def test_an_id_reused_metres_away_is_another_person_and_the_first_is_remembered():
-    tracker = szlib.Tracker()
-    tracker.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], now=0.0)
-    seen = tracker.see([[5.0, 3.0, 0.0, 0.0]], ids=["a"], now=0.1)
-    assert positions(seen) == [(5.0, 3.0), (0.1, 0.0)]
-    assert [person.heading for person in seen.people] == [None, 0.0], (
-        "no heading of somebody else"
-    )
-    assert positions(tracker.see([[5.0, 3.0, 0.0, 0.0]], ids=["a"], now=1.5)) == [
-        (5.0, 3.0)
-    ]
-    near = tracker.see([[6.0, 3.0, 0.0, 0.0]], ids=["a"], now=1.6)
-    assert positions(near) == [(6.0, 3.0)], "a metre is noise"
-
-
 # ids that change
 
 
