@@ -16,20 +16,26 @@ The robot keeps its way until another one is `SWITCH_GAIN` cheaper, so that it d
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from itertools import combinations
-from math import acos, ceil, dist, hypot, inf, pi, sqrt
+from math import asin, ceil, dist, hypot, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import binary_dilation
-from scipy.sparse import coo_array
+from scipy.ndimage import (
+    binary_dilation,
+    distance_transform_edt,
+    label,
+    minimum_filter1d,
+)
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import Obstacles, ellipse_formula, find_bodies, find_places
+from .obstacles import Obstacles, ellipse_formula, find_places
 from .people import STANDING_SPEED
 from .settings import MPCSettings
 
@@ -47,40 +53,36 @@ SEARCH_INTERVAL = 0.4
 ZONE_SECOND, BODY_SECOND, REPEAT_SECOND = 2.0, 100.0, 1.5
 """Price of a second in a zone, in a body, and near a way that was found before [s] (assumed)."""
 SIDE_PRICE = 0.5
-"""Price of meeting people head-on, and passing on the side that is not `pass_side` [s] (assumed)."""
+"""Price of passing people, who do not cross the way, on the side that is not `pass_side` [s] (assumed)."""
 GROUP_SECOND, GROUP_DISTANCE, GROUP_SPEED = 4.0, 1.5, 0.3
-"""Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed)."""
+"""Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed).
+
+People of a group that is given are together up to twice this distance."""
 SWITCH_GAIN = 1.0
 """A way is kept until another one is this much cheaper [s] (assumed)."""
-_GROUP_REACH = (
-    3.0  # people of a group that is given are together up to this distance [m]
-)
 MOST_WAYS = 3
 """Number of ways that are looked for (assumed)."""
-_AROUND_WALLS, _AROUND_POINTS = 2.0, 8.0  # edge of a map [m]
-_FARTHEST = 20.0  # of a target on a route [m]
-_LEAST = 0.06  # clearance that a map can show [m]
-_CHUNK = 1_000_000  # cells that are measured at once
-_PEOPLE = 10.0  # people who are farther from the robot than this are left out [m]
+# the edge of a map is so far from its points, at least and at most [m]
+_AROUND, _FARTHEST_WALL = 8.0, 35.0
+_FARTHEST = 10.0  # of a target on a route [m]
+_BLOCK = 16  # rows and columns of cells that are measured at once
 # places of people who stand are rounded so, and a goal is the same if it moved less [m]
 _MOVED, _GOAL_MOVED = 0.3, 0.5
-_NEAR_WAY = 0.45  # places that are nearer to a way than this are near it [m]
-_PLACES = 48  # of what is fixed, around which turns are measured
+_NEAR_WAY = 3  # cells that are near a way are at most so many steps from it
+_EVERY = 20  # turns are measured around so many cells that are not free, one of
 _MOST_SHARE = 1.2  # least offset of obstacles, in cells: no step leads across a wall
 _NEIGHBOURS = (0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)
-_MOVE_PRICE = (
-    0.015  # price of a step to a neighbour: a robot that waits stands still [s]
-)
+# price of a step to a neighbour: a robot that waits stands still [s]
+_MOVE_PRICE = 0.015
+_MOVES = _MOVE_PRICE * np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
 _NAMED_WITHIN = 2.5  # people who are passed nearer than this are named [m]
-_DOOR = 0.6  # a door has less room than this on both sides, and more so far before and behind [m]
+_ALONG = 0.4  # cosine of the angle from a walk within which one is in front or behind
+_DOOR = 1.0  # a place is narrow if no free disc of this radius holds it [m]
 _NAMED = 3  # largest number of parts of a name
-_WAITING = 8  # tenths of a second of rest that are called waiting
-# where free space is looked for, from a zone's centre to where the robot passes
-_ALONG = np.linspace(0, 1, 20)
-# times at which people are looked at [s], and the time between two of them
+_WAITING = 0.8  # rest that is called waiting [s]
+# times at which people are looked at, and the time between two of them [s]
 _TIMES = np.linspace(0.0, 2 * SEARCH_TIME, 121)
-_TICK, _LAST = float(_TIMES[1]), 60  # of a search
-_MOVES = np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
+_TICK = float(_TIMES[1])
 
 
 class Way(NamedTuple):
@@ -129,159 +131,129 @@ class Map:
     ----------
     fixed : what is fixed.
     points : which the map must hold, shape (n, 2) [m].
-    cell : side of a cell [m].
+    clearance : of thin walls [m].
 
     Attributes
     ----------
-    free : whether h >= 0 in the centre of a cell, shape (nx, ny).
+    free : whether h >= 0 in the centre of a cell, shape (nx, ny); False in the two rows at each edge.
+    is_narrow : whether it is free, but in no free disc of the radius `_DOOR`.
     price : of a second in a cell, because of people who stand [s].
+    blocked : whether a cell is not free, or in the body of somebody who stands.
+    is_near : whether a cell can be reached from where the robot was.
     seconds_to_goal : from the centre of a cell [s]; inf without a way.
+    end : the point to which they are measured [m].
+    is_reached : whether this is the goal.
     """
 
-    def __init__(self, fixed: Obstacles, points: Array, cell: float = CELL) -> None:
-        boxes = [g.kind.bounds(g.numbers, g.offsets) for g in fixed.groups]
-        ends = np.vstack([np.zeros((0, 2)), *(each for box in boxes for each in box)])
+    def __init__(self, fixed: Obstacles, points: Array, clearance: float = inf) -> None:
+        boxes = [np.vstack(g.kind.bounds(g.numbers, g.offsets)) for g in fixed.groups]
+        ends = np.vstack([points - _AROUND, points + _AROUND, *boxes])
         ends = ends[np.isfinite(ends).all(axis=1)]
-        first, last = points.min(axis=0), points.max(axis=0)
-        low = np.vstack([first - _AROUND_POINTS, ends - _AROUND_WALLS]).min(axis=0)
-        high = np.vstack([last + _AROUND_POINTS, ends + _AROUND_WALLS]).max(axis=0)
-        # of a large building the part around the points
-        w, h = last - first
-        half = sqrt(max((w - h) ** 2 + 4 * MOST_CELLS * cell**2, (w + h) ** 2))
-        margin = max((half - w - h) / 4, _AROUND_POINTS)
-        self.corner = np.maximum(low, first - margin)
-        size = np.minimum(high, last + margin) - self.corner
-        self.cell = max(cell, float(sqrt(size.prod() / MOST_CELLS)))
-        self.shape = tuple(np.ceil(size / self.cell).astype(int).tolist())
-        self._last = np.subtract(self.shape, 1)
-        end = self.corner + self.cell * np.array(self.shape)
-        self._box = self.corner.tolist(), end.tolist()
-        self._is_thin = any(g.offsets.min() < 2 * self.cell for g in fixed.groups)
-        covered = self._cover(fixed)
-        self.free = ~covered | covered.all()
-        self._places = np.argwhere(self.free)
+        low = np.maximum(ends.min(axis=0), points.min(axis=0) - _FARTHEST_WALL)
+        high = np.minimum(ends.max(axis=0), points.max(axis=0) + _FARTHEST_WALL)
+        self._middle, size = (low + high) / 2, high - low
+        self._reach = size / 2
+        side = min(CELL, clearance / _MOST_SHARE)
+        self.cell = max(side, float(sqrt(size.prod() / MOST_CELLS)))
+        self.corner = low - 4 * self.cell
+        self.shape = tuple((np.ceil(size / self.cell).astype(int) + 8).tolist())
+        covered = self._cover(fixed)[2:-2, 2:-2]
+        self.free = np.pad(~covered | covered.all(), 2)
+        self.blocked = ~self.free
+        wide = distance_transform_edt(self.free) * self.cell >= _DOOR
+        self.is_narrow = self.free & (distance_transform_edt(~wide) * self.cell > _DOOR)
+        self._parts, _ = label(self.free, np.ones((3, 3)))
         self._link()
 
     def _cover(self, fixed: Obstacles) -> Mask:
-        """Where h < 0. Each obstacle is measured in the cells of its box."""
+        """Where h < 0. In each block of cells the obstacles are measured whose box reaches into it."""
         covered = np.zeros(self.shape, bool)
+        cells = np.moveaxis(np.indices(self.shape), 0, -1)
         for kind, numbers, given in fixed.groups:
             offsets = np.maximum(given, _MOST_SHARE * self.cell)
-            low, high = (each - self.corner for each in kind.bounds(numbers, offsets))
-            first = (low / self.cell).clip(0, self.shape).astype(int)
-            last = (high / self.cell + 1).clip(0, self.shape).astype(int)
-            size = np.maximum(last - first, 0)
-            counts = size.prod(axis=1)
-            n_parts = 1 + min(len(counts), int(counts.sum() // _CHUNK))
-            for rows in np.array_split(np.arange(len(counts)), n_parts):
-                which = np.repeat(rows, counts[rows])
-                begins = counts[rows].cumsum() - counts[rows]
-                place = np.arange(len(which)) - np.repeat(begins, counts[rows])
-                i, j = first[which].T + np.divmod(place, size[which, 1])
-                x, y = self.centers(np.column_stack([i, j])).T
-                d = kind.distance(x, y, 0.0, *numbers[which].T)
-                unsafe = d < offsets[which]
-                covered[i[unsafe], j[unsafe]] = True
+            low, high = kind.bounds(numbers, offsets)
+            for i in range(0, self.shape[0], _BLOCK):
+                for j in range(0, self.shape[1], _BLOCK):
+                    block = slice(i, i + _BLOCK), slice(j, j + _BLOCK)
+                    centers = self.centers(cells[block])
+                    is_near = (low <= centers[-1, -1]) & (high >= centers[0, 0])
+                    rows = is_near.all(axis=1)
+                    x, y = centers[..., None].transpose(2, 0, 1, 3)
+                    d = kind.distance(x, y, 0.0, *numbers[rows].T)
+                    covered[block] |= (d < offsets[rows]).any(axis=-1)
         return covered
 
     def _link(self) -> None:
         """Find the pairs of free neighbours, in 16 directions, and their distances."""
-        padded = np.pad(np.full(self.shape, -1, np.int32), 2, constant_values=-1)
-        self._numbers = padded[2:-2, 2:-2]
-        self._numbers[self.free] = np.arange(len(self._places))
-        pairs, lengths = list[Array](), list[Array]()
-        for step in _NEIGHBOURS:
-            to = padded[tuple(slice(2 + n, n - 2 or None) for n in step)]
-            both = np.stack([self._numbers, to])[:, (self._numbers >= 0) & (to >= 0)]
-            pairs.append(both)
-            lengths.append(np.full(both.shape[1], self.cell * hypot(*step)))
+        pairs, lengths, numbers = (
+            list[Array](),
+            list[Array](),
+            np.flatnonzero(self.free),
+        )
+        for i, j in _NEIGHBOURS:
+            to = numbers + i * self.shape[1] + j
+            is_free = self.free.ravel()[to]
+            pairs.append(np.stack([numbers, to])[:, is_free])
+            lengths.append(np.full(is_free.sum(), self.cell * hypot(i, j)))
         self._pairs, self._lengths = np.hstack(pairs), np.concatenate(lengths)
 
-    def centers(self, cells: Cells) -> Array:
-        """Centres of `cells`, shape (n, 2) [m]."""
-        return np.asarray(self.corner + (cells + 0.5) * self.cell)
+    def centers(self, cells: ArrayLike) -> Array:
+        """Centres of `cells`, shape (..., 2) [m]."""
+        return np.asarray(self.corner + (np.array(cells) + 0.5) * self.cell)
 
-    def holds(self, *points: Point) -> bool:
+    def holds(self, points: Array) -> bool:
         """True if these `points` lie within the map."""
-        low, high = self._box
-        return all(
-            first <= x < last
-            for point in points
-            for first, x, last in zip(low, point, high, strict=True)
-        )
+        return bool((np.abs(points - self._middle) < self._reach).all())
 
     def locate(self, points: Array) -> tuple[Cells, Cells]:
         """The cells of `points`, shape (..., 2), as two indices; beyond the map the nearest one."""
         cells = ((points - self.corner) / self.cell).astype(int)
-        cells = np.minimum(np.maximum(cells, 0), self._last)
+        cells = cells.clip(0, np.subtract(self.shape, 1))
         return cells[..., 0], cells[..., 1]
 
-    def find_cell(self, point: ArrayLike, among: Mask | None = None) -> tuple[int, ...]:
-        """The cell of a `point`, or the nearest one that is free, or is `among` these."""
-        at, mask = self.locate(np.array(point)), self.free if among is None else among
-        if not mask[at]:
-            places = np.argwhere(mask)
-            at = places[((places - at) ** 2).sum(axis=1).argmin()]
-        return int(at[0]), int(at[1])
+    def find_cell(self, point: ArrayLike, among: Mask | None = None) -> Cells:
+        """The cell of a `point`, or the nearest one that is free, or is `among` these, shape (2,)."""
+        cell, mask = self.locate(np.array(point)), self.free if among is None else among
+        places = np.argwhere(mask) if not mask[cell] else np.array([cell])
+        return np.asarray(places[((places - cell) ** 2).sum(axis=1).argmin()])
 
-    def measure(self, start: Point, goal: Point, speed: float, price: Array) -> bool:
+    def measure(self, start: Point, goal: Point, speed: float, price: Array) -> None:
         """Measure the times to the `goal` at this `speed` [m/s], with the `price` of a second in each cell.
 
-        False if there is no way from the `start`: the times are to the nearest point that can be reached.
+        If there is no way from the `start`, to the nearest point that can be reached.
         """
-        self.price, begin = price, self.find_cell(start)
-        cost, (i, j) = 1 + price[self.free], self._pairs
+        self.price, self.blocked = price, ~self.free | (price >= BODY_SECOND)
+        self.is_near = self._parts == self._parts[*self.find_cell(start)]
+        cell = self.find_cell(goal, self.is_near)
+        self.is_reached = bool(self.is_near[*self.find_cell(goal)])
+        self.end = np.array(goal) if self.is_reached else self.centers(cell)
+        cost, (i, j) = 1 + price.ravel(), self._pairs
         weights = self._lengths / speed * (cost[i] + cost[j]) / 2
-        graph = coo_array((weights, (i, j)), shape=(len(cost), len(cost))).tocsr()
-        self._measure_from(graph, self.find_cell(goal))
-        is_reached = bool(np.isfinite(self.seconds_to_goal[begin]))
-        if not is_reached:
-            self._measure_from(graph, begin)
-            nearest = self.find_cell(goal, np.isfinite(self.seconds_to_goal))
-            self._measure_from(graph, nearest)
-        return is_reached
-
-    def _measure_from(self, graph: Any, cell: tuple[int, ...]) -> None:
-        number, self.end = self._numbers[cell], cell
+        graph = csr_array((weights, (i, j)), shape=2 * cost.shape)
+        number = np.ravel_multi_index(cell, self.shape)
         far, self._next = dijkstra(graph, False, number, return_predecessors=True)
-        self.seconds_to_goal = np.full(self.shape, inf)
-        self.seconds_to_goal[self.free] = far
+        self.seconds_to_goal = far.reshape(self.shape)
 
     def descend(self, cell: Any) -> Array:
         """Centres of the cells from `cell` to the end, shape (n, 2) [m]."""
-        found, k = list[int](), int(self._numbers[*cell])
+        found, k = list[int](), int(np.ravel_multi_index(tuple(cell), self.shape))
         while k >= 0:
             found.append(k)
             k = int(self._next[k])
-        return self.centers(self._places[found])
+        return self.centers(np.column_stack(np.unravel_index(found, self.shape)))
 
-    def sees(self, start: Array, ends: Array, blocked: Mask) -> Mask:
-        """Whether straight lines from `start` to `ends`, shape (n, 2) [m], cross no cell that is `blocked`.
+    def sees(self, start: Array, ends: Array) -> Mask:
+        """Whether straight lines from `start` to `ends`, shape (n, 2) [m], cross no `blocked` cell.
 
         Those around the start do not count.
         """
         lines = ends - start
-        longest = np.abs(lines).max(initial=0.0) * (1 + self._is_thin)
-        n = 1 + int(longest / self.cell)
-        offsets = np.arange(n + 1)[:, None, None] / n * lines
-        hidden = blocked[self.locate(start + offsets)]
-        if not self._is_thin or blocked[self.locate(start)]:
-            distances = np.hypot(*offsets.T).T
-            hidden &= distances >= 1.5 * self.cell
+        n = 2 + int(2 * np.abs(lines).max(initial=0.0) / self.cell)
+        offsets = np.linspace(0, 1, n)[:, None, None] * lines
+        hidden = self.blocked[self.locate(start + offsets)]
+        distances = np.hypot(*offsets.T).T
+        hidden &= distances >= 1.5 * self.cell
         return np.asarray(~hidden.any(axis=0))
-
-    def list_around(self, at: Point, people: Array) -> Array:
-        """Places of `people`, and those near `at` that are not free, at `_TIMES`, shape (n, k, 2) [m]."""
-        cell, size = np.array(self.find_cell(at)), ceil(SEARCH_RADIUS / self.cell)
-        low, (i, j) = np.maximum(cell - size, 0), cell + size
-        fixed = np.argwhere(~self.free[low[0] : i, low[1] : j]) + low
-        still = self.centers(fixed[:: 1 + len(fixed) // _PLACES])[:, None]
-        return np.concatenate([people, np.repeat(still, len(_TIMES), axis=1)])
-
-
-def choose_cell(clearance: float) -> float:
-    """Side of a cell with which a map shows walls of this `clearance` [m]."""
-    return min(CELL, max(_LEAST, clearance) / _MOST_SHARE)
 
 
 class WayFinder:
@@ -296,290 +268,233 @@ class WayFinder:
     def __init__(self, fixed: Obstacles, settings: MPCSettings) -> None:
         self._fixed, self._s = fixed, settings
         self._map: Map | None = None
-        self._every = ceil(SEARCH_INTERVAL / settings.dt)
         self.reset()
 
     def reset(self) -> None:
         """Forget the goal and the way."""
         self._ways, self._goal, self._steps = list[Way](), (inf, inf), 0
-        self._n_people, self._known = 0, tuple[Any, ...]()
+        self._n_people = 0
+        self._standing: Any = None
 
     def find(
         self, at: Point, goal: Point, zones: Obstacles, groups: Sequence[Hashable]
     ) -> Heading:
         """The way from `at` to the `goal` among people with these `zones` and `groups`."""
         if dist(goal, self._goal) > _GOAL_MOVED:
-            self._ways, self._goal, self._steps = [], goal, 0
+            self.reset()
+            self._goal = goal
         m = self._get_map(at, goal)
         is_searched = not self._steps or zones.size != self._n_people
         if is_searched:
-            self._search(m, at, goal, Stamps(zones, groups, m.cell, self._s))
-            self._steps, self._n_people = self._every, zones.size
+            self._search(m, at, goal, Surroundings(zones, groups, at, m, self._s))
+            self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
+            self._n_people = zones.size
         self._steps -= 1
-        target, length = self._find_target(m, at, self._ways[0].points, self._blocked)
-        length = length if self._is_reached else inf
-        return Heading(target, length, tuple(self._ways), is_searched)
+        heading, _ = self._head_for(m, at, self._ways[0].points)
+        length = heading.length if m.is_reached else inf
+        return Heading(heading.target, length, tuple(self._ways), is_searched)
 
     def follow(self, at: Point, goal: Point, route: Array) -> Heading | None:
         """The target from `at` on a `route` to the `goal`, shape (m, 2) [m]; None if no point is in sight."""
         m, self._steps = self._get_map(at, goal), 0
-        points = _sample_line(np.vstack([route, goal]), m.cell)
-        begin = int(np.hypot(*(points - at).T).argmin())
-        near = points[begin:][: 1 + int(min(self._s.lookahead, _FARTHEST) / m.cell)]
-        if not m.sees(np.array(at), near, ~m.free).any():
-            return None
-        return Heading(*self._find_target(m, at, points, ~m.free))
+        line = shapely.LineString(np.vstack([route, goal]))
+        points = shapely.get_coordinates(shapely.segmentize(line, m.cell))
+        heading, is_seen = self._head_for(m, at, points)
+        return heading if is_seen else None
 
     def _get_map(self, at: Point, goal: Point) -> Map:
         """The map that holds these points."""
-        if self._map is None or not self._map.holds(at, goal):
-            side = choose_cell(self._s.r_robot + self._s.eps)
-            self._map, self._known = Map(self._fixed, np.array([at, goal]), side), ()
-            self._steps = 0
+        points = np.array([at, goal])
+        if self._map is None or not self._map.holds(points):
+            self._map = Map(self._fixed, points, self._s.r_robot + self._s.eps)
+            self._standing, self._steps = None, 0
         return self._map
 
-    def _search(self, m: Map, at: Point, goal: Point, stamps: Stamps) -> None:
+    def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
         """Find the ways anew, and choose one."""
-        places = stamps.find_places(_TIMES)
-        is_near = np.hypot(*(places[:, 0] - at).T) < _PEOPLE
-        moved = np.hypot(*(places[:, _LAST] - places[:, 0]).T)
-        stands = is_near & (moved < STANDING_SPEED * SEARCH_TIME)
-        near = np.flatnonzero(is_near[: stamps.n_people])
-        people = places[near]
-        known = (self._goal, *np.round(places[stands, 0] / _MOVED).ravel().tolist())
-        if known != self._known or not np.isfinite(m.seconds_to_goal[m.find_cell(at)]):
-            still = np.flatnonzero(stands)
-            (price,) = stamps.find_prices(still, np.zeros(1), m.corner, m.shape)
-            self._is_reached = m.measure(at, goal, self._s.v_max, price)
-            self._known, self._blocked = known, ~m.free | (price >= BODY_SECOND)
-        walks = np.flatnonzero(is_near & ~stands)
-        around = m.list_around(at, people)
-        ways = self._find_ways(m, at, goal, people, around, stamps, walks)
-        ways.sort(key=lambda way: way.cost)
+        standing = np.round(near.places[near.stands, 0] / _MOVED).ravel().tolist()
+        if standing != self._standing or not m.is_near[*near.start]:
+            (price,) = near.find_prices(near.stands, np.zeros(1), 0, m.shape)
+            m.measure(at, goal, self._s.v_max, price)
+            self._standing = standing
+        before = np.array(inf)
         if self._ways:
-            before = _find_turns(_cut(self._ways[0], at), around)
-            kept = [
-                way for way in ways if not _differ(_find_turns(way, around), before)
-            ]
-            if kept and kept[0].cost < ways[0].cost + SWITCH_GAIN:
-                ways = [kept[0], *(way for way in ways if way is not kept[0])]
-        nearest = "to the nearest point that it can reach"
-        self._ways = [
-            way._replace(
-                name=_name(m, way, people, near) if self._is_reached else nearest
-            )
-            for way in ways
-        ]
+            last = self._ways[0]
+            passed = last.times[np.hypot(*(last.points - at).T).argmin()]
+            before = _find_turns(last, near.around, passed)
+        found = list[tuple[float, Way]]()
+        for way, turns in self._find_ways(m, at, near):
+            gain = SWITCH_GAIN * (np.abs(turns - before) <= pi).all()
+            found.append((way.cost - gain, way))
+        self._ways = [way for _, way in sorted(found, key=lambda pair: pair[0])]
 
     def _find_ways(
-        self,
-        m: Map,
-        at: Point,
-        goal: Point,
-        people: Array,
-        around: Array,
-        stamps: Stamps,
-        walks: Cells,
-    ) -> list[Way]:
-        """Distinct ways on the map `m` among `people`; those in the rows `walks` of `stamps` walk."""
-        v_max, shape = self._s.v_max, np.array(m.shape)
-        start = np.array(m.find_cell(at, np.isfinite(m.seconds_to_goal)))
-        size = ceil(SEARCH_RADIUS / m.cell)
-        low = np.maximum(start - size, 0)
-        window = tuple(map(slice, low, np.minimum(start + size + 1, shape)))
-        far, begin = m.seconds_to_goal[window], start - low
-        ends = np.array(goal)[None] if self._is_reached else np.zeros((0, 2))
+        self, m: Map, at: Point, near: Surroundings
+    ) -> Iterator[tuple[Way, Array]]:
+        """Distinct ways on the map `m` from `at` this point, and their turns."""
+        v_max, low, window = self._s.v_max, near.low, near.window
+        far, begin = m.seconds_to_goal[window], near.start - low
         dt = 1.2 * m.cell / v_max  # between a step along an axis and a diagonal one
         times: Array = dt * np.arange(1.0, ceil(SEARCH_TIME / dt) + 1)
-        corner = m.corner + low * m.cell
-        prices = stamps.find_prices(walks, times, corner, far.shape)
-        if not prices.any() and not m.price[window].any():
-            points = np.vstack([at, m.descend(start)[1:], ends])
-            if len(ends) and m.sees(points[0], ends, ~m.free)[0]:
-                points = np.linspace(at, goal, len(points))
-            return [Way(points, _time(points, v_max), float(far[tuple(begin)]))]
-        costs = (dt * (1 + m.price[window] + prices)).astype(np.float32)
+        prices = near.find_prices(~near.stands, times, low, far.shape) + m.price[window]
+        is_empty = not prices.any()
+        costs = dt * (1 + prices)
         costs[:, ~m.free[window]] = inf
-        end = np.array(m.end) - low
-        if (end >= 0).all() and (end < far.shape).all():
-            costs[:, end[0], end[1]] = 0.0  # a robot at its goal may stay there
-        ways, turns = list[Way](), list[Array]()
-        again = np.zeros(far.shape, np.float32)
-        tube = np.ones(2 * [2 * int(_NEAR_WAY / m.cell) + 1])
-        while len(ways) < MOST_WAYS:
-            cells = cross_layers(costs + again, begin, far)
+        other_side = "left of" if self._s.pass_side == "right" else "right of"
+        found, again = list[Array](), np.zeros(far.shape, np.float32)
+        while len(found) < (1 if is_empty else MOST_WAYS):
+            cells = begin[None] if is_empty else cross_layers(costs + again, begin, far)
             k, then = len(cells) - 1, cells[-1]
-            rest = m.descend(low + then)[1:]
-            points = np.vstack([at, m.centers(low + cells[1:]), rest, ends])
-            begun = np.concatenate([[0.0], times[:k]])
-            late = begun[-1] + _time(points[k:], v_max)[1:]
-            within = costs[np.arange(k), *cells[1:].T].sum()
-            way = Way(points, np.concatenate([begun, late]), float(within + far[*then]))
-            turns.append(_find_turns(way, around))
-            if not all(_differ(turns[-1], each) for each in turns[:-1]):
-                break
-            price = self._price_sides(way, people, turns[-1][: len(people)])
-            ways.append(way._replace(cost=way.cost + price))
+            within, later = m.centers(low + cells[1:]), m.descend(low + then)[1:]
+            points = np.vstack([at, within, later, m.end])
+            if is_empty and m.sees(points[0], points[-1:])[0]:
+                points = np.linspace(at, m.end, len(points))
+            late = k * dt + _time(points[k:], v_max)
+            arrivals = np.concatenate([dt * np.arange(k), late])
+            cost = float(costs[np.arange(k), *cells[1:].T].sum() + far[*then])
+            way = Way(points, arrivals, cost)
+            turns = _find_turns(way, near.around)
+            # ways are distinct if they turn differently around something
+            if not all((np.abs(turns - each) > pi).any() for each in found):
+                return
+            found.append(turns)
+            name = _name(m, way, near, turns)
+            cost += SIDE_PRICE * (other_side in name)
+            yield way._replace(cost=cost, name=name), turns
             used = np.zeros(far.shape, bool)
-            used[*cells.T] = np.hypot(*(cells - begin).T) * m.cell > 2 * _NEAR_WAY
-            again += np.float32(dt * REPEAT_SECOND) * binary_dilation(used, tube)
-        return ways
+            used[*cells.T] = True
+            again += dt * REPEAT_SECOND * binary_dilation(used, iterations=_NEAR_WAY)
 
-    def _price_sides(self, way: Way, people: Array, turns: Array) -> float:
-        """Price of a `way` that meets `people` head-on, and `turns` to the side that is not preferred [s]."""
-        x, y = way.points[-1] - way.points[0]
-        vx, vy = (people[:, 1] - people[:, 0]).T / _TICK
-        share = self._s.head_on_share * np.hypot(vx, vy) * np.hypot(x, y)
-        meets = (np.abs(x * vy - y * vx) <= share) & (x * vx + y * vy <= 0)
-        sign = 1 if self._s.pass_side == "right" else -1
-        is_other = sign * turns < -pi / 2
-        return SIDE_PRICE * bool((meets & is_other).any())
+    def _head_for(self, m: Map, at: Point, points: Array) -> tuple[Heading, bool]:
+        """The target on the way through these `points`, the length of the way, and whether it is in sight.
 
-    def _find_target(
-        self, m: Map, at: Point, points: Array, blocked: Mask
-    ) -> tuple[Point, float]:
-        """The target on the way through these `points`, and the length of the way [m].
-
-        It is the farthest one in sight, at most `lookahead` away. Behind it the target goes on straight ahead
-        while this is free, so that the robot does not stop there.
+        It is the farthest one in sight, at most `lookahead` away, or a corner close by.
         """
-        p, lookahead = np.array(at), self._s.lookahead
+        p, farthest = np.array(at), min(self._s.lookahead, _FARTHEST)
         points = points[int(np.hypot(*(points - p).T).argmin()) :]
         lengths = _time(np.vstack([p, points]), 1.0)[1:]
-        n = int(np.searchsorted(lengths, min(lookahead, _FARTHEST)))
-        n = max(n, min(2, len(points)))  # the next cell of a large map may be farther
-        chosen = {*range(min(1, n - 1), min(8, n)), *range(8, n, 3), n - 1}
-        choice = np.array(sorted(chosen))
-        seen = choice[m.sees(p, points[choice], blocked)]
-        around = int(np.searchsorted(lengths, 3 * m.cell))  # a corner, close by
-        if around < len(points) and blocked[m.locate(points[around])]:
-            around = 0  # somebody stands there
-        i = max(int(seen.max(initial=0)), min(around, n - 1))
-        last, left = points[i], float(lengths[-1] - lengths[i])
-        gone = float(np.hypot(*(last - p)))
-        if left and gone >= 2 * m.cell:
-            shares = np.linspace(min(lookahead, gone + left) / gone, 1.0, 12)
-            beyond = p + shares[:, None] * (last - p)
-            free = m.sees(p, beyond, blocked)
-            last = beyond[free.argmax()] if free.any() else last
-        x, y = last.tolist()
-        return (x, y), gone + left
+        n = max(2, int(np.searchsorted(lengths, farthest)))
+        seen = m.sees(p, points[:n])
+        chosen = seen | (lengths[:n] < 3 * m.cell)
+        i = int(np.flatnonzero(chosen).max(initial=0))
+        (x, y), left = points[i].tolist(), float(lengths[-1] - lengths[i])
+        return Heading((x, y), dist(at, (x, y)) + left), bool(seen.any())
 
 
-def _find_turns(way: Way, around: Array) -> Array:
-    """Angles by which a `way` turns around places `around` it at `_TIMES`, shape (n,) [rad]."""
-    offset = way.at(_TIMES) - around
+def _find_turns(way: Way, around: Array, since: float = 0.0) -> Array:
+    """Angles by which a `way` turns around places `around` it at `_TIMES`, shape (n,) [rad].
+
+    The robot is on the way `since` so long [s].
+    """
+    offset = way.at(since + _TIMES) - around
     turns = np.diff(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)
     return np.asarray(((turns + pi) % (2 * pi) - pi).sum(axis=1))
 
 
-def _differ(turns: Array, others: Array) -> bool:
-    """True if two ways are distinct, by their turns."""
-    return bool((np.abs(turns - others) > pi).any())
-
-
-class Stamps:
-    """Prices of cells around each person, and between two who stand or walk together.
+class Surroundings:
+    """What is near the robot: cells of the map, people, where they will be, and prices around them.
 
     Parameters
     ----------
     zones : of all people.
     groups : to which they belong, None for somebody of whom this is not known.
-    cell : side of a cell [m].
+    at : where the robot is [m].
+    m : the map.
     s : settings of the robot.
+
+    Attributes
+    ----------
+    start, low, window : the cell of the robot, the first one that is near, and all of these.
+    people : places of people at `_TIMES`, shape (n, k, 2) [m].
+    places : those, and the middles of two who are together, shape (n + pairs, k, 2) [m].
+    stands : whether these places stay where they are.
+    around : those of people, and of cells that are not free, shape (n + cells, k, 2) [m].
     """
 
     def __init__(
-        self, zones: Obstacles, groups: Sequence[Hashable], cell: float, s: MPCSettings
+        self,
+        zones: Obstacles,
+        groups: Sequence[Hashable],
+        at: Point,
+        m: Map,
+        s: MPCSettings,
     ) -> None:
-        self._cell, self._zones, self.n_people = cell, zones, zones.size
-        if not zones.groups:
-            return
-        own, bodies = zones.groups[0], find_bodies(zones, s).groups[0]
-        at, velocities = own.numbers[:, 5:7], own.numbers[:, 7:9].tolist()
-        foci = np.abs(own.numbers[:, :4] - np.tile(at, 2)).max()
-        reach = foci + float((own.numbers[:, 4] + own.offsets).max())
-        reach = max(reach, BODY_RADIUS + float(bodies.offsets.max()))
-        n = ceil(min(reach, 2 * SEARCH_RADIUS) / cell)
-        x, y = cell * np.mgrid[-n : n + 1, -n : n + 1]
-        prices = np.zeros((zones.size, *x.shape))
-        for (kind, numbers, offsets), price in (
-            (own, ZONE_SECOND),
-            (bodies, BODY_SECOND),
-        ):
-            px, py = at.T[..., None, None]
-            d = kind.distance(px + x, py + y, 0.0, *numbers.T[..., None, None])
-            prices[d < offsets[:, None, None]] = price
-        places = at.tolist()
-
-        def are_together(i: int, j: int) -> bool:
-            """True if the people `i` and `j` are of one group, or are near and walk alike."""
-            apart = dist(places[i], places[j])
-            if None not in (groups[i], groups[j]):
-                return groups[i] == groups[j] and apart < _GROUP_REACH
-            is_alike = dist(velocities[i], velocities[j]) < GROUP_SPEED
-            return apart < GROUP_DISTANCE and is_alike
-
-        pairs = [
-            pair for pair in combinations(range(zones.size), 2) if are_together(*pair)
-        ]
-        self._pairs = i, j = np.reshape(pairs, (-1, 2)).astype(int).T
-        apart = np.hypot(*(at[i] - at[j]).T)[:, None, None]
-        between = np.hypot(x, y) < apart / 2
-        found = np.concatenate([prices, GROUP_SECOND * between])
-        self._prices = found.astype(np.float32)
-
-    def find_places(self, times: Array) -> Array:
-        """Places of people, and of the middles of pairs, at these `times`, shape (n, k, 2) [m]."""
-        people = find_places(self._zones, times)
-        if not len(people):
-            return people
-        i, j = self._pairs
-        return np.concatenate([people, (people[i] + people[j]) / 2])
+        size, self.start = ceil(SEARCH_RADIUS / m.cell), m.find_cell(at)
+        self.low = np.maximum(self.start - size, 0)
+        self.window = tuple(map(slice, self.low, self.start + size + 1))
+        walls = m.centers(np.argwhere(~m.free[self.window]) + self.low)
+        walls = walls[::_EVERY, None].repeat(len(_TIMES), axis=1)
+        people = find_places(zones, _TIMES)
+        x, y = m.cell * np.mgrid[-size : size + 1, -size : size + 1]
+        prices = np.zeros((len(people), *x.shape))
+        for kind, numbers, offsets in zones.groups:
+            table = numbers.T[..., None, None]
+            d = kind.distance(table[5] + x, table[6] + y, 0.0, *table)
+            prices[d < offsets[:, None, None]] = ZONE_SECOND
+        prices[:, np.hypot(x, y) < BODY_RADIUS + s.r_robot + s.body_gap] = BODY_SECOND
+        i, j = _find_pairs(people, groups)
+        apart = np.hypot(*(people[i, 0] - people[j, 0]).T)[:, None, None]
+        between = GROUP_SECOND * (np.hypot(x, y) < apart / 2)
+        self._prices = np.concatenate([prices, between]).astype(np.float32)
+        self._map, self.people = m, people
+        self.places = np.concatenate([people, (people[i] + people[j]) / 2])
+        self.around = np.concatenate([people, walls])
+        moved = np.hypot(*(self.places[:, -1] - self.places[:, 0]).T)
+        self.stands = moved < STANDING_SPEED * _TIMES[-1]
 
     def find_prices(
-        self, rows: Cells, times: Array, corner: Array, shape: tuple[int, ...]
+        self, rows: Mask, times: Array, low: Any, shape: tuple[int, ...]
     ) -> Array:
-        """Prices of the people in these `rows`, at each of these `times`, shape (times, nx, ny).
+        """Prices of the `places` of these `rows`, at each of these `times`, shape (times, nx, ny).
 
-        The `corner` is that of the first cell [m], of so many as `shape` says. Where people overlap, the
+        The first cell is `low`, and there are so many as `shape` says. Where people overlap, the
         higher price counts.
         """
-        n = self._prices.shape[1] if len(rows) else 1
+        n, stamps = self._prices.shape[1], self._prices[rows]
         prices = np.zeros((len(times), *(size + 2 * n for size in shape)), np.float32)
-        cells = np.floor((self.find_places(times) - corner) / self._cell).astype(int)
-        first = cells - n // 2 + n
-        is_inside = np.all((first > 0) & (first < np.add(shape, n)), axis=-1)
-        for row in rows:
-            (inside,) = is_inside[row].nonzero()
-            corners = first[row, inside].tolist()
-            for k, (i, j) in zip(inside.tolist(), corners, strict=True):
-                part = prices[k, i : i + n, j : j + n]
-                np.maximum(part, self._prices[row], out=part)
-        return np.asarray(prices[:, n:-n, n:-n], float)
+        places = self.places[rows][:, np.searchsorted(_TIMES[:-1], times)]
+        cells = np.floor((places - self._map.corner) / self._map.cell).astype(int)
+        cells += n - n // 2 - low
+        is_inside = ((cells > 0) & (cells < np.add(shape, n))).all(axis=-1)
+        for row, k in np.argwhere(is_inside).tolist():
+            i, j = cells[row, k].tolist()
+            part = prices[k, i : i + n, j : j + n]
+            np.maximum(part, stamps[row], out=part)
+        return prices[:, n:-n, n:-n]
+
+
+def _find_pairs(people: Array, groups: Sequence[Hashable]) -> Cells:
+    """Pairs of `people` of one of the `groups`, or who are near and walk alike, shape (2, n)."""
+    pairs, first = list[tuple[int, int]](), people[:, 0]
+    walks = (people[:, 1] - first) / _TICK
+    for i, j in combinations(range(len(groups)), 2):
+        known, is_alike = {groups[i], groups[j]}, dist(walks[i], walks[j]) < GROUP_SPEED
+        reach = is_alike if None in known else 2 * (len(known) == 1)
+        if dist(first[i], first[j]) < reach * GROUP_DISTANCE:
+            pairs.append((i, j))
+    return np.array(pairs, int).reshape(-1, 2).T
 
 
 def cross_layers(costs: Any, begin: Any, far: Array) -> Array:
     """Cells of the cheapest way through layers of `costs`, one in each, shape (k + 1, 2).
 
-    It begins in the cell `begin`, and ends in the last layer, or in any at the edge: where its cost and `far`
-    are least together.
+    It begins in the cell `begin`, and ends in the last layer, or in any at the edge or at the goal: where its
+    cost and `far` are least together.
     """
-    layers = np.full((len(costs) + 1, *(n + 2 for n in far.shape)), inf, np.float32)
-    layers[0, begin[0] + 1, begin[1] + 1] = 0.0
-    step = np.float32(_MOVE_PRICE)
-    for now, then, cost in zip(layers, layers[1:], costs, strict=False):
-        across = np.minimum(np.minimum(now[:-2], now[2:]) + step, now[1:-1])
-        both = np.minimum(across[:, :-2], across[:, 2:]) + step
-        then[1:-1, 1:-1] = np.minimum(both, across[:, 1:-1]) + cost
-    ends = layers[:, 1:-1, 1:-1] + far
-    ends[:-1, 1:-1, 1:-1] = inf
-    k, i, j = np.unravel_index(ends.argmin(), ends.shape)
-    cells = [np.array([i, j])]
+    layers = np.full((len(costs) + 1, *far.shape), inf, np.float32)
+    layers[0, *begin] = 0.0
+    for k, cost in enumerate(costs):
+        across = np.minimum(layers[k], minimum_filter1d(layers[k], 3, 0) + _MOVE_PRICE)
+        moved = minimum_filter1d(across, 3, 1) + _MOVE_PRICE
+        layers[k + 1] = np.minimum(across, moved) + cost
+    ends, inside = layers + far, np.pad(far[1:-1, 1:-1] > 0, 1)
+    ends[:-1, inside] = inf
+    k, *last = map(int, np.unravel_index(ends.argmin(), ends.shape))
+    cells = [np.array(last)]
     for layer in layers[:k][::-1]:
         i, j = cells[-1]
-        best = (layer[i : i + 3, j : j + 3] + step * _MOVES).argmin()
-        cells.append(cells[-1] + np.divmod(best, 3) - 1)
+        near = np.pad(layer, 1, constant_values=inf)[i : i + 3, j : j + 3]
+        cells.append(cells[-1] + np.divmod((near + _MOVES).argmin(), 3) - 1)
     return np.array(cells[::-1])
 
 
@@ -589,66 +504,39 @@ def _time(points: Array, speed: float) -> Array:
     return np.concatenate([[0.0], lengths.cumsum() / speed])
 
 
-def _sample_line(corners: Array, piece: float, longest: float = inf) -> Array:
-    """Points on a line through `corners`, at most a `piece` apart, and at most so far along it [m]."""
-    lengths = _time(corners, 1.0)
-    end = min(float(lengths[-1]), longest)
-    along = np.linspace(0, end, 2 + int(end / piece))
-    return np.column_stack([np.interp(along, lengths, each) for each in corners.T])
-
-
-def _cut(way: Way, at: Point) -> Way:
-    """What is left of a `way` for a robot that is `at` this point."""
-    k = int(np.hypot(*(way.points - at).T).argmin())
-    left = np.vstack([at, way.points[k + 1 :]])
-    return way._replace(points=left, times=way.times[k:] - way.times[k])
+def _name(m: Map, way: Way, near: Surroundings, turns: Array) -> str:
+    """A way in words: a door, the side of people whom it passes, and for whom it waits."""
+    if not m.is_reached:
+        return "to the nearest point that it can reach"
+    found, points = _find_door(m, way), way.at(_TIMES)
+    moved = np.hypot(*np.diff(way.points, axis=0).T)
+    rest = np.diff(way.times)[moved == 0].sum()
+    for number, places in enumerate(near.people):
+        offsets, walk = points - places, (places[1] - places[0]) / _TICK
+        gaps = np.hypot(*offsets.T)
+        k = gaps.argmin()
+        turn = turns[number]
+        if abs(turn) < pi / 2 or gaps[k] > _NAMED_WITHIN:
+            continue
+        side, ahead = "right of" if turn > 0 else "left of", walk @ offsets[k]
+        if abs(ahead) > _ALONG * gaps[k] * max(np.hypot(*walk), STANDING_SPEED):
+            behind = "waits for" if rest > _WAITING else "behind"
+            side = "in front of" if ahead > 0 else behind
+        found.append((_TIMES[k], f"{side} person {number}"))
+    words = ", ".join(word for _, word in sorted(found)[:_NAMED])
+    is_straight = moved.sum() < 1.05 * dist(way.points[-1], way.points[0]) + m.cell
+    return words or ("straight to the goal" if is_straight else "around walls")
 
 
 def _find_door(m: Map, way: Way) -> list[tuple[float, str]]:
-    """When a way leads through the first door, and where: it is narrow, with more room before and behind."""
-    places = _sample_line(way.points, m.cell, 2 * SEARCH_RADIUS)
-    ahead = np.gradient(places, axis=0)
-    across = ahead[:, ::-1] * (-1, 1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
-    aside = np.arange(m.cell, _DOOR + m.cell, m.cell)[:, None, None] * across
-    left, right = (~m.free[m.locate(places + s * aside)].all(axis=0) for s in (-1, 1))
-    ends = np.flatnonzero(np.diff(np.pad(left & right, 1)))
-    for first, last in ends.reshape(-1, 2).tolist():
-        if first and last < len(places) and (last - first) * m.cell < 2 * _DOOR:
-            x, y = places[(first + last - 1) // 2]
-            k = int(np.hypot(*(way.points - (x, y)).T).argmin())
-            return [(way.times[k], f"through the door at ({x:.1f}, {y:.1f})")]
-    return []
-
-
-def _name(m: Map, way: Way, people: Array, numbers: Cells) -> str:
-    """A way in words: a door, the side of people whom it passes, and for whom it waits."""
-    found, points = _find_door(m, way), way.at(_TIMES)
-    for number, places in zip(numbers, people, strict=True):
-        offsets = points - places
-        k = int(np.hypot(*offsets.T).argmin())
-        if not 0 < k < len(_TIMES) - 1 or np.hypot(*offsets[k]) > _NAMED_WITHIN:
-            continue
-        # complex numbers: the conjugate of u times v has the angle from u to v
-        back = complex(*points[k + 1 :][:5][-1] - points[max(k - 5, 0)]).conjugate()
-        walk, offset = complex(*places[k + 1] - places[k]) / _TICK, complex(*offsets[k])
-        side = "left of" if (back * offset).imag > 0 else "right of"
-        if abs((back * walk).imag) > abs(back) / 2 * max(abs(walk), STANDING_SPEED):
-            is_before = (walk.conjugate() * offset).real > 0
-            side = "in front of" if is_before else "behind"
-        found.append((_TIMES[k], f"{side} person {number}"))
-    words = [word for _, word in sorted(found)[:_NAMED]]
-    moved = np.hypot(*np.diff(points, axis=0).T)
-    is_away = np.hypot(*(way.points - way.points[-1]).T) > 2 * m.cell
-    arrival = way.times[is_away].max(initial=0.0)
-    rests = (moved < 0.2 * moved.max(initial=0.0)) & (_TIMES[1:] < arrival)
-    if rests.sum() >= _WAITING and len(people):
-        last = points[np.flatnonzero(rests)[-1]]
-        k = int(np.hypot(*(people[:, 0] - last).T).argmin())
-        words.insert(0, f"waits for person {numbers[k]}")
-    straight = dist(way.points[-1], way.points[0])
-    is_straight = _time(way.points, 1.0)[-1] < 1.05 * straight + m.cell
-    usual = "straight to the goal" if is_straight else "around walls"
-    return ", ".join(words) or usual
+    """When a way leads through the first door, and where: a narrow place, with room before and behind."""
+    is_narrow = m.is_narrow[m.locate(way.points)]
+    ends = np.flatnonzero(np.diff(is_narrow))[:2] + 1
+    if is_narrow[0] or len(ends) < 2:
+        return []
+    k = ends.sum() // 2
+    x, y = way.points[k]
+    return [(way.times[k], f"through the door at ({x:.1f}, {y:.1f})")]
 
 
 def find_target(
@@ -669,63 +557,51 @@ def find_target(
 
     Notes
     -----
-    A person blocks the way if the line to the goal enters the set h < 0, itself an ellipse with the foci of
-    the zone. Its two tangents from the robot lie at the angles +-w about -grad h, the bisector of the
-    directions to the foci (this holds for all confocal ellipses). Let the goal lie at the angle b from there.
-    At b = 0 both ways around are equally long, the optimum is to stand still in front of the person, and
-    every solver stays there for ever. So for |b| <= share * w, with share = `head_on_share`, the target lies
-    along the tangent on `pass_side`, as far away as the goal. Once the robot is on that side, the target
-    turns back to the goal between |b| = share * w and 2 share * w, without a jump. If a wall leaves no space
-    beside the person on that side, the same holds for the other side. If there is no space at all, the
-    target stays the goal, and the robot yields. The paper has no such rule.
+    A person blocks the way if the line to the goal enters the set h < 0. Seen from the robot, this set is
+    taken for a circle around its centre, as wide as it is across the way (exactly so for a round zone). Its
+    two tangents lie at the angles +-w from the centre. Let the goal lie at the angle b from there. At b = 0
+    both ways around are equally long, the optimum is to stand still in front of the person, and every solver
+    stays there for ever. So for |b| <= share * w, with share = `head_on_share`, the target lies along the
+    tangent on `pass_side`, as far away as the goal. Once the robot is on that side, the target turns back to
+    the goal between |b| = share * w and 2 share * w, without a jump. If a wall leaves no space beside the
+    person on that side, the same holds for the other side. If there is no space at all, the target stays the
+    goal, and the robot yields. The paper has no such rule.
 
     The rule holds only if the barrier is active now, h <= closing speed * dt / gamma, or may become so
     within the horizon, h <= closing speed * horizon. (With the first condition alone and gamma > 1/N, the
     slightest tilt of the zone would decide the side before this rule does.) It does not hold for people who
-    walk across the way, because they clear it themselves, nor for a person who stands on the goal. The
+    walk across the way, because they clear it themselves, nor for those in whose zone the goal lies. The
     nearest person counts.
     """
-    s, (x, y), chosen, away = settings, position, None, dist(position, goal)
-    wx, wy = goal[0] - x, goal[1] - y
-    nearest, margin = away, s.r_robot + s.eps
+    s, at, way = settings, complex(*position), complex(*goal) - complex(*position)
+    nearest, turn = abs(way), 1.0 + 0.0j
+    margin, share = s.r_robot + s.eps, s.head_on_share
     time = s.dt * max(1 / s.gamma, sum(s.step_lengths))
-    for zone in zones if away and s.head_on_share else ():
-        vx, vy = zone[7:9]
-        speed = hypot(vx, vy)
-        if abs(wx * vy - wy * vx) > s.head_on_share * speed * away:
-            continue
-        h = ellipse_formula(x, y, *zone[:5]) - margin
-        if h <= min(nearest, (s.v_max + speed) * time):
-            nearest, chosen = h, zone
-    if not chosen:
-        return goal
-    at, end = complex(x, y), complex(*goal)
-    end = at + (end - at) * _turn_aside(at, end, chosen, fixed, s)
-    return end.real, end.imag
+    for zone in zones if way and share else ():
+        walk, h = complex(*zone[7:9]), ellipse_formula(*position, *zone[:5]) - margin
+        is_across = abs((way.conjugate() * walk).imag) > share * abs(way * walk)
+        is_on_goal = ellipse_formula(*goal, *zone[:5]) < margin
+        reach = min(nearest, (s.v_max + abs(walk)) * time)
+        if h <= reach and not is_across and not is_on_goal:
+            nearest, turn = h, _turn_aside(at, way, zone, fixed, s)
+    target = complex(*goal) + way * (turn - 1)  # exactly the goal without a turn
+    return target.real, target.imag
 
 
 def _turn_aside(
-    at: complex, end: complex, zone: Sequence[float], fixed: Obstacles, s: MPCSettings
+    at: complex, way: complex, zone: Sequence[float], fixed: Obstacles, s: MPCSettings
 ) -> complex:
-    """By what the way from `at` to the `end` is turned, to pass a person with this `zone`."""
+    """By what the `way` is turned, to pass a person with this `zone`."""
+    a, b = complex(*zone[:2]), complex(*zone[2:4])
+    semi_axis = zone[4] + s.r_robot + s.eps
+    center, across = (a + b) / 2 - at, 1j * way / abs(way)
     # complex numbers: the conjugate of u times v has the angle from u to v
-    way, semi_axis = end - at, zone[4] + s.r_robot + s.eps  # of the set h < 0
-    a, b = complex(*zone[:2]) - at, complex(*zone[2:4]) - at
-    is_on_goal = ellipse_formula(end.real, end.imag, *zone[:5]) < s.r_robot + s.eps
-    if not a * b or (is_on_goal and hypot(*zone[7:9]) < STANDING_SPEED):
-        return 1.0
-    cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
-    w = acos(max(-1.0, min(1.0, cosine))) / 2
-    bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
+    width = sqrt(semi_axis**2 - ((a - b).conjugate() * across).imag ** 2 / 4)
+    w = asin(width / max(abs(center), width))
+    bearing = phase(center.conjugate() * way)
     for side in (1, -1) if s.pass_side == "left" else (-1, 1):
-        lead = side * bearing / (s.head_on_share * w) if w else inf
-        if not -1 <= lead < 2:
-            continue
-        # from the zone's centre to where the robot passes
-        beside = side * 1j * way / abs(way)
-        half = (a - b) / 2
-        width = sqrt(semi_axis**2 - (half.conjugate() * beside).imag ** 2)
-        points = at + (a + b) / 2 + width * beside * _ALONG
-        if (fixed.h(points.real, points.imag) >= 0).all():
+        passes = at + center + side * width * across
+        lead = side * bearing / (s.head_on_share * w)
+        if -1 <= lead < 2 and (fixed.h(passes.real, passes.imag) >= 0).all():
             return rect(1.0, (side * w - bearing) * min(1.0, 2 - lead))
     return 1.0
