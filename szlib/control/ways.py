@@ -141,8 +141,8 @@ class Map:
     blocked : whether a cell is not free, or in the body of somebody who stands.
     is_near : whether a cell can be reached from where the robot was.
     seconds_to_goal : from the centre of a cell [s]; inf without a way.
-    end : the point to which they are measured [m].
-    is_reached : whether this is the goal.
+    end : the point to which they are measured: the goal, or the nearest one that can be reached [m].
+    is_reached : whether it is the goal.
     """
 
     def __init__(self, fixed: Obstacles, points: Array, clearance: float = inf) -> None:
@@ -185,11 +185,8 @@ class Map:
 
     def _link(self) -> None:
         """Find the pairs of free neighbours, in 16 directions, and their distances."""
-        pairs, lengths, numbers = (
-            list[Array](),
-            list[Array](),
-            np.flatnonzero(self.free),
-        )
+        pairs, lengths = list[Array](), list[Array]()
+        numbers = np.flatnonzero(self.free)
         for i, j in _NEIGHBOURS:
             to = numbers + i * self.shape[1] + j
             is_free = self.free.ravel()[to]
@@ -226,7 +223,7 @@ class Map:
         self.is_near = self._parts == self._parts[*self.find_cell(start)]
         cell = self.find_cell(goal, self.is_near)
         self.is_reached = bool(self.is_near[*self.find_cell(goal)])
-        self.end = np.array(goal) if self.is_reached else self.centers(cell)
+        self.end = self.centers(cell)
         cost, (i, j) = 1 + price.ravel(), self._pairs
         weights = self._lengths / speed * (cost[i] + cost[j]) / 2
         graph = csr_array((weights, (i, j)), shape=2 * cost.shape)
@@ -317,6 +314,8 @@ class WayFinder:
             (price,) = near.find_prices(near.stands, np.zeros(1), 0, m.shape)
             m.measure(at, goal, self._s.v_max, price)
             self._standing = standing
+        if m.is_reached:
+            m.end = np.array(goal)  # it may have moved a little
         before = np.array(inf)
         if self._ways:
             last = self._ways[0]
@@ -376,7 +375,7 @@ class WayFinder:
         n = max(2, int(np.searchsorted(lengths, farthest)))
         seen = m.sees(p, points[:n])
         chosen = seen | (lengths[:n] < 3 * m.cell)
-        i = int(np.flatnonzero(chosen).max(initial=0))
+        i = np.flatnonzero(chosen).max(initial=0)
         (x, y), left = points[i].tolist(), float(lengths[-1] - lengths[i])
         return Heading((x, y), dist(at, (x, y)) + left), bool(seen.any())
 
@@ -447,8 +446,8 @@ class Surroundings:
     ) -> Array:
         """Prices of the `places` of these `rows`, at each of these `times`, shape (times, nx, ny).
 
-        The first cell is `low`, and there are so many as `shape` says. Where people overlap, the
-        higher price counts.
+        The first cell is `low`, and there are so many as `shape` says. Where people overlap, the higher price
+        counts.
         """
         n, stamps = self._prices.shape[1], self._prices[rows]
         prices = np.zeros((len(times), *(size + 2 * n for size in shape)), np.float32)

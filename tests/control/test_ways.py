@@ -345,6 +345,13 @@ def test_own_ways_and_given_routes_may_take_turns() -> None:
     assert step.ways[0].points[0] == pytest.approx((3.5, 0.0))
 
 
+def test_a_goal_that_moved_a_little_is_reached():
+    controller = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD)
+    drive(controller, (3.0, 0.0), 5)
+    steps = drive(controller, (3.0, 0.3), 150)
+    assert np.hypot(*(steps[-1].predicted[0, :2] - (3.0, 0.3))) < 0.05
+
+
 def test_a_goal_that_walks_away_leaves_the_map() -> None:
     controller = szlib.MPCCBF(ZONE, walls=BAR, settings=AHEAD)
     for k in range(140):
