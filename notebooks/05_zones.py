@@ -70,7 +70,7 @@ from szlib.plaza.settings import PlazaSettings
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 from szlib.zones.ellipses import DIRECTIONS
-from szlib.zones.respect_likelihood import smooth_paths
+from szlib.zones.outliers import smooth_paths
 
 warnings.simplefilter("ignore", szlib.DataWarning)  # few people on a side: the intervals say it
 record = NotebookRecord("05_zones", globals())

@@ -27,8 +27,7 @@ from szlib.tracks import funnels
 from szlib.zones.ellipses import DIRECTIONS, Ellipse, unit_vectors
 from szlib.zones.estimators import Estimator
 from szlib.zones.hulls import find_widest_gap, missing_directions_error
-from szlib.zones.outliers import encounter_numbers, is_close
-from szlib.zones.respect_likelihood import SMOOTHING, smooth_paths
+from szlib.zones.outliers import SMOOTHING, encounter_numbers, is_close, smooth_paths
 from szlib.zones.social_zone import METHODS
 from szlib.zones.uncertainty import SPEED_BAND
 

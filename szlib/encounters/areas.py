@@ -27,17 +27,19 @@ _AREA = rf"(?i)\s*((MULTI)?POLYGON\b|\{{)|[\s,]*{_NUMBER}([\s,]+{_NUMBER})*[\s,]
 
 _WALKING = 0.4  # a slower person [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)
 _OUTLYING = 1e-3  # share of positions on either side that does not belong to the site: trackers jump
-# Width of the cells on which people were seen [m], and the most of them along an axis: those of a large site
-# are wider.
-_CELL, _MOST_CELLS = 0.125, 300
+_CELL = 0.125  # width of the cells on which people were seen [m]
+_MOST_CELLS = 300  # along an axis: those of a large site are wider
 # People can be seen unless a disc of this radius [m] fits in where nobody was seen (assumed: as wide as gaps
-# that few people leave).  Strips as wide as this [m] on both sides of their middle are left out (assumed).
-_GAP, _STRIP = 2.0, 0.5
+# that few people leave).
+_GAP = 2.0
+_STRIP = 0.5  # strips as wide as this on both sides of their middle are left out (assumed) [m]
 _ROUGH = 0.05  # deviation of the outline, which has fewer corners then [m]
 # Hardly anybody walked on a square of this width [m] if fewer people did (measured on the ATC mall: 1 m
 # misses pillars).  Where the median square that was walked on saw no more than `_FEW`, many are empty by
 # chance (measured on plazas of 100 to 2,600 encounters).
-_SPOT, _PEOPLE, _FEW = 0.5, 3, 12
+_SPOT = 0.5
+_PEOPLE = 3
+_FEW = 12
 _DOUBTFUL = 0.01  # share of the area that is reported (assumed)
 _OUTLINE = "the outline of the place where people were seen"
 _APART = 51.0  # between recordings that are placed side by side, up to a metre less [m]
@@ -104,7 +106,8 @@ def place_apart(tracks: pd.DataFrame) -> pd.DataFrame:
     if places.nunique() < 2:
         return tracks
     metres = (tracks["x"].round(3) // 1).groupby(places)
-    low, width = metres.min(), metres.max() - metres.min() + _APART
+    low = metres.min()
+    width = metres.max() - metres.min() + _APART
     begin = low.iloc[0] + width.cumsum().shift(fill_value=0)
     return tracks.assign(x=tracks["x"] + places.map(begin - low))
 

@@ -201,7 +201,8 @@ class Extraction:
         DataError : the folder holds no extracted days, or they differ in settings or version; or none is
             left, or a day is damaged.
         """
-        folder, excluded = Path(out), set(map(str, exclude))
+        folder = Path(out)
+        excluded = set(map(str, exclude))
         if folder_purpose(folder) != PURPOSE:
             raise DataError(
                 f"{folder}: holds no extracted days; expected a folder of `szlib extract`"
@@ -275,7 +276,8 @@ class Extraction:
         shown = self.table.to_string(index=False, float_format="{:.1f}".format)
         statuses = self.table["status"].value_counts().sort_index()
         text = ", ".join(f"{count} {status}" for status, count in statuses.items())
-        if isinstance(area := self.settings.area, Area):
+        area = self.settings.area
+        if isinstance(area, Area):
             text = f"{text}; area: {area} {area.reason}".rstrip()
         return f"{shown}\n{text}"
 
@@ -337,7 +339,8 @@ def extract_days(
         days.setdefault(find_day(file, recipe) or printable(name), []).append(file)
     included = {day: days[day] for day in sorted(days.keys() - excluded)}
     shared = [day for day in included if has_calendar(day) or len(included) == 1]
-    common, contents = settings, {}
+    common = settings
+    contents = {}
     for day in shared:
         # the first day with an area; computing a day that fails says why
         with suppress(SzlibError), unchanged_files(included[day]):
@@ -390,7 +393,8 @@ def extract_day(
             described = thread.submit(
                 copy_context().run, describe_source, files, settings, recipe
             )
-            samples, status = None, "kept"
+            samples = None
+            status = "kept"
             if (out / f"{day}.parquet").is_file():
                 samples = load_day(out, day, described.result())
             if samples is None:

@@ -30,8 +30,8 @@ from .kinds import REACH, kinds_of_pairs, of_kind
 from .occupants import TrackRows, find_occupants, occupant_changes, sample_rows
 from .settings import EncounterSettings
 
-# larger than every rounding error of a time [s], position [m]
-_TIME_ROUNDING, _POSITION_ROUNDING = (0.1, 1e-6)
+_TIME_ROUNDING = 0.1  # larger than every rounding error of a time [s]
+_POSITION_ROUNDING = 1e-6  # and of a position [m]
 
 
 def find_encounters(
@@ -79,7 +79,8 @@ def find_encounters(
     """
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     tracks, area = find_place(tracks, settings)
-    rows, steps = TrackRows.from_tracks(tracks), settings.steps
+    rows = TrackRows.from_tracks(tracks)
+    steps = settings.steps
     at_opening, throughout, other = _check_rows(rows, area, settings)
     first, missed = _apply_conditions(at_opening)
     windows = _check_windows(rows, first, other, steps, throughout)
@@ -139,7 +140,8 @@ def _check_rows(
     has_room[at] = settings.has_walls or area.covers(corners.real, corners.imag)
     ready = has_room & (rows.speed >= settings.min_speed)
     people, other = find_occupants(rows, at, ready, settings.space)
-    one, nearest = people == 1, settings.min_distance
+    one = people == 1
+    nearest = settings.min_distance
     far = one & (rows.distance(np.arange(len(rows)), other) >= nearest)
     at_opening = {
         "not in the area": inside,
@@ -173,7 +175,8 @@ def _check_windows(
     Both people are tracked, the conditions hold `throughout`, and no two windows of one person overlap.
     """
     last = np.minimum(first + steps, len(rows) - 1)
-    both, piece = np.stack([first, other[first]]), np.r_[rows.piece, -np.ones(steps)]
+    both = np.stack([first, other[first]])
+    piece = np.r_[rows.piece, -np.ones(steps)]
     tracked = (piece[both + steps] == piece[both]).all(axis=0)
     found = {"a track ends within the window": tracked}
     for reason, condition in throughout.items():
@@ -185,7 +188,8 @@ def _check_windows(
 
 def _drop_overlaps(first: np.ndarray, valid: np.ndarray, steps: int) -> np.ndarray:
     """Which valid windows are taken: the earliest one, then the next that begins after its end, and so on."""
-    taken, end = np.zeros(len(first), bool), -1
+    taken = np.zeros(len(first), bool)
+    end = -1
     for window in np.flatnonzero(valid):
         if first[window] > end:
             taken[window] = True
@@ -243,7 +247,8 @@ def select_near(
     width = max_gap + _TIME_ROUNDING
     before = ceil(VELOCITY_SPAN / width) + 1
     after = max(before, ceil(settings.duration / width) + 1)
-    cell, keys = pl.col("cell"), ["day", "id", "cell"]
+    cell = pl.col("cell")
+    keys = ["day", "id", "cell"]
     all_rows = rows.lazy().with_columns(cell=(pl.col("t") / width).floor())
     cells = all_rows.group_by(keys).agg(
         pl.min("x", "y").name.prefix("low_"), pl.max("x", "y").name.prefix("high_")

@@ -43,10 +43,13 @@ STRANGERS = "strangers"  # all kinds but companions
 # The common track reaches this far beyond the area [m] (measured: it finds all 62 pairs of the real day that
 # the rule finds on whole tracks, and 7 more; 10 m finds one fewer, with twice the rows of a raw day).
 REACH = 5.0
-# Companions: shortest time together [s], largest distance [m], for this share of the time (measured).
-TOGETHER, NEAR, NEAR_SHARE = 5.0, 2.0, 0.8
-# Companions: largest relative velocity [m/s], for this share of the time (measured).
-EQUAL_VELOCITY, EQUAL_SHARE = 0.4, 0.5
+# Companions (measured): the shortest time together [s], and the largest distance [m] and relative velocity
+# [m/s], each for a share of that time.
+TOGETHER = 5.0
+NEAR = 2.0
+NEAR_SHARE = 0.8
+EQUAL_VELOCITY = 0.4
+EQUAL_SHARE = 0.5
 # a slower person [m/s] is standing (paper: 0.4 for a reference pedestrian)
 WALKING = 0.4
 # Directions at most this far apart [rad] are the same, from pi less this on opposite (assumed).

@@ -212,7 +212,8 @@ def null_encounters(
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     tracks, area = find_place(tracks, settings)
     settings = replace(settings, area=area)
-    rows, crowd = TrackRows.from_tracks(tracks), Crowd.from_tracks(tracks, area)
+    rows = TrackRows.from_tracks(tracks)
+    crowd = Crowd.from_tracks(tracks, area)
     leader, seconds = _find_leaders(rows)
     # Encounters depend on nobody who is never in the area.
     visitors = rows.select(np.isin(rows.person, rows.person[rows.within(area)]))
@@ -224,7 +225,8 @@ def null_encounters(
         samples = find_encounters(moved, settings=settings)
         groups = samples.groupby("encounter", sort=False)
         nearest = groups.agg(kind=("kind", "first"), nearest=("distance", "min"))
-        is_near, far = samples["distance"] <= r_max, f"farther than {r_max} m"
+        is_near = samples["distance"] <= r_max
+        far = f"farther than {r_max} m"
         close = funnels.select(samples, is_near, "samples: close", far)
         return close, nearest.reset_index()
 
@@ -273,7 +275,8 @@ def null_pairs(
     (2, ['encounter', 'kind', 'nearest', 'shift'])
     """
     tracks, place = find_place(tracks, EncounterSettings(area=area))
-    crowd, rng = Crowd.from_tracks(tracks, place), np.random.default_rng(seed)
+    crowd = Crowd.from_tracks(tracks, place)
+    rng = np.random.default_rng(seed)
     seconds = np.repeat(crowd.rows.recorded[1], SECTORS)
 
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -306,7 +309,8 @@ def _search(
     """
     require(shifts >= 1, "shifts", shifts, "at least 1")
     require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
-    offset, found = 0, []
+    offset = 0
+    found = []
     for shift in tqdm(range(shifts), unit="shift", disable=None if progress else True):
         samples, encounters = (
             each.assign(shift=shift, encounter=each["encounter"] + offset)

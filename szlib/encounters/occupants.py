@@ -41,7 +41,8 @@ def find_neighbours(
     length = np.ptp(place.real) + 2 * reach
     along = place.real + length * (moment - moment.min())
     order = np.argsort(along)
-    along, across = along[order], place.imag[order]
+    along = along[order]
+    across = place.imag[order]
     last = np.searchsorted(along, along + reach, side="right")
     for rows in np.array_split(np.arange(len(order)), 1 + len(order) // _AT_ONCE):
         number, other = spans(rows + 1, last[rows])
@@ -147,11 +148,14 @@ def find_occupants(
     Only rows that are `ready` (booleans) have a space.  The space lies inside the area, so only the rows
     `inside` the area (their indices) can be in it.
     """
-    people, other = np.zeros(len(rows), np.intp), np.full(len(rows), -1)
+    people = np.zeros(len(rows), np.intp)
+    other = np.full(len(rows), -1)
     reach = float(np.hypot(*space.corners.T).max()) + _ROUNDING
     for pairs in find_neighbours(rows.place[inside], rows.moment[inside], reach):
         ref, oth = inside[np.concatenate([pairs, pairs[::-1]], axis=1)]
-        ref, oth = ref[ready[ref]], oth[ready[ref]]
+        is_ready = ready[ref]
+        ref = ref[is_ready]
+        oth = oth[is_ready]
         seen = (rows.place[oth] - rows.place[ref]) * rows.ahead[ref].conj()
         within = space.contains(seen.real, seen.imag)
         people += np.bincount(ref[within], minlength=len(rows))
@@ -183,7 +187,8 @@ def sample_rows(
     The time is that of the reference pedestrian: in a shifted crowd they differ.
     """
     days = tracks["day"].astype("category")
-    at, ids = rows.order[ref], tracks["id"].to_numpy()
+    at = rows.order[ref]
+    ids = tracks["id"].to_numpy()
     seen = rows.place[other] - rows.place[ref]
     heading, other_heading = (np.angle(rows.velocity[each]) for each in (ref, other))
     columns = [

@@ -185,8 +185,10 @@ class Crowd:
     @cached_property
     def stream(self) -> np.ndarray:
         """Number of the stream of each person; each day has its own."""
-        rows, unit = self.rows, self.unit[self.rows.person]
-        along, across = rows.velocity.real, rows.velocity.imag
+        rows = self.rows
+        unit = self.unit[self.rows.person]
+        along = rows.velocity.real
+        across = rows.velocity.imag
         heading = np.arctan2(np.bincount(unit, across), np.bincount(unit, along))
         width = 2 * np.pi / SECTORS
         from_border = np.abs(((heading[:, None] - _OFFSETS) / width + 0.5) % 1 - 0.5)
@@ -199,7 +201,8 @@ class Crowd:
     @cached_property
     def sensor(self) -> SensorCheck:
         """What the tracks say about the sensor."""
-        met, rows = self.meet(CLOSE), self.rows
+        met = self.meet(CLOSE)
+        rows = self.rows
         near = self._near_rows(met, np.flatnonzero(met.kind > 0), CLOSE)
         found = count_ends(rows, self.inside, near[1:])
         found |= measure_noise(rows, self.inside)
@@ -216,7 +219,8 @@ class Crowd:
 
         With `shifts` each stream is moved in time by its own shift [s], and pairs of one stream are left out.
         """
-        rows, (first, period) = self.coarse_rows, self.rows.recorded
+        rows = self.coarse_rows
+        first, period = self.rows.recorded
         second = rows.tick // TICKS_PER_SECOND - first[rows.day]
         group = rows.person
         if shifts is not None:
@@ -235,9 +239,11 @@ class Crowd:
         near = near[:, order]
         of_pair = np.cumsum(np.diff(key[order], prepend=-1) > 0) - 1
         pairs, nearest, at = self._approach(near, of_pair)
-        third, kept = self._third_people(near, at, r_max), nearest < r_max
+        third = self._third_people(near, at, r_max)
+        kept = nearest < r_max
         is_kept = kept[of_pair]
-        near, of_pair = near[:, is_kept], (np.cumsum(kept) - 1)[of_pair[is_kept]]
+        near = near[:, is_kept]
+        of_pair = (np.cumsum(kept) - 1)[of_pair[is_kept]]
         kind = self._kinds(near, of_pair)
         return Meetings(pairs[:, kept], nearest[kept], kind, third[kept], near, of_pair)
 
@@ -262,7 +268,8 @@ class Crowd:
         A moment between two whole seconds is given twice, once by each of them.
         """
         wanted = np.isin(met.of_pair, pairs)
-        near, of_pair = met.near[:, wanted], met.of_pair[wanted]
+        near = met.near[:, wanted]
+        of_pair = met.of_pair[wanted]
         moment, step = np.nonzero(self._distances(near) < r_max)
         both = self.whole_seconds[near[:, moment]] + _STEPS[step]
         return np.stack([of_pair[moment], *both])
@@ -271,7 +278,8 @@ class Crowd:
         self, values: np.ndarray, at: np.ndarray, steps: np.ndarray
     ) -> np.ndarray:
         """The `values` that lie `steps` [ticks] after the rows `at`; NaN out of the area, or past a gap."""
-        start, piece = at[..., None], self.rows.piece
+        start = at[..., None]
+        piece = self.rows.piece
         around = (start + steps) % len(piece)  # beyond the ends: another piece
         known = self.inside[around] & (piece[around] == piece[start])
         return np.where(known, values[around], np.nan)
@@ -297,7 +305,8 @@ class Crowd:
         """Number of the kind of each pair, from its rows at whole seconds."""
         pairs = self.coarse_rows.person[near[:, firsts(of_pair)]]
         codes = classify_motion(self.coarse_rows, near, of_pair, pairs.shape[1])
-        (unit, own), (stream, other) = self.unit[pairs], self.stream[pairs]
+        unit, own = self.unit[pairs]
+        stream, other = self.stream[pairs]
         rules = [unit == own, (stream == other) & (codes != _STANDING)]
         names = [KINDS.index(kind) for kind in (COMPANIONS, SAME)]
         return np.select(rules, names, codes)

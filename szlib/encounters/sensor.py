@@ -40,13 +40,14 @@ _SMALL = 0.005  # level at which a distance counts as not resolved
 _MOST_LAG = 20  # steps of the clock between two samples of the slowest sensor
 _BENT = 1e-6  # a path that bends by less is interpolated [m]
 _FEWEST_KNOTS = 10  # fourth differences of a person whose noise is measured
-_SECOND, _FOURTH = np.array([1, -2, 1]), np.array([1, -4, 6, -4, 1])
+_SECOND = np.array([1, -2, 1])
+_FOURTH = np.array([1, -4, 6, -4, 1])
 BEFORE = 12
 """Steps of the clock before and after a pass at which velocities are compared."""
 
-# Exchanged ids: the change of velocity of both people [m/s] that is more than a step aside, and the largest
-# share of it that is left if the ids are exchanged back.
-_TURNED, _LEFT_OVER = 1.0, 0.5
+# Exchanged ids: the change of velocity of both people [m/s] that is more than a step aside.
+_TURNED = 1.0
+_LEFT_OVER = 0.5  # largest share of it that is left if the ids are exchanged back
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ class SensorCheck:
         return self.resolved > 0
 
     def __str__(self) -> str:
-        ends, noise = "no track ends inside the area", "no error of positions was found"
+        ends = "no track ends inside the area"
+        noise = "no error of positions was found"
         passes = f"no two people pass within {NEAR_END:g} m"
         if self.ends:
             ends = (
@@ -98,7 +100,8 @@ class SensorCheck:
                 f"of tracks have somebody within {NEAR_END:g} m, and {self.samples_near:.1%} of all samples"
             )
         if self.noise:
-            low, high = 100 * self.noise_low, 100 * self.noise_high
+            low = 100 * self.noise_low
+            high = 100 * self.noise_high
             noise = f"a position errs by {100 * self.noise:.1f} cm ({low:.1f} to {high:.1f})"
         if self.passes:
             low, high = _interval_of_share(self.exchanged, self.passes)
@@ -123,11 +126,14 @@ def count_ends(
     breaks = np.diff(rows.piece) != 0
     recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
     is_end = (np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded
-    nearest, distance = np.full(len(rows), np.inf), rows.distance(*pairs)
+    nearest = np.full(len(rows), np.inf)
+    distance = rows.distance(*pairs)
     for each in pairs:
         np.minimum.at(nearest, each, distance)
-    ends, samples = nearest[is_end], nearest[inside]
-    n, (near, common) = len(ends), (np.histogram(d, _EDGES)[0] for d in (ends, samples))
+    ends = nearest[is_end]
+    samples = nearest[inside]
+    n = len(ends)
+    near, common = (np.histogram(d, _EDGES)[0] for d in (ends, samples))
     expected = common / max(len(samples), 1)
     least = beta.ppf(_SMALL, near, n - near + 1)
     is_lost = (near >= _FEWEST) & (least > _MOST * expected)

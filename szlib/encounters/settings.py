@@ -102,7 +102,8 @@ class EncounterSettings:
             "area" if name == "square" else name: value
             for name, value in parameters.items()
         }
-        if unknown := sorted(given.keys() - set(known)):
+        unknown = sorted(given.keys() - set(known))
+        if unknown:
             raise DataError(f"unknown parameter {unknown}; expected some of {known}")
         if len(given) < len(parameters):
             raise DataError(

@@ -169,7 +169,8 @@ def _run(options: argparse.Namespace) -> int:
         parameters["area"] = options.area
     if options.walls:
         parameters["has_walls"] = True
-    if reading := _read_options(options, options.data).as_json():
+    reading = _read_options(options, options.data).as_json()
+    if reading:
         parameters["reading"] = reading
     from .folders import require_place
     from .runner import run

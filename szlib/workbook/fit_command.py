@@ -90,7 +90,8 @@ def fit(
     zone.plot(SPEED if SPEED in zone.ellipses else None, ax=figure.subplots())
     figure.savefig(content, format="png", dpi=150)
     zone.save(file)
-    write_file(picture := file.with_suffix(".png"), content.getvalue())
+    picture = file.with_suffix(".png")
+    write_file(picture, content.getvalue())
     notes = [f"zone: {printable(file)}; figure: {printable(picture)}"]
     notes += [] if table is not None else [NO_TRACKS]
     verdict = f"zone at {SPEED:g} m/s: {zone.verdict(SPEED).sentence}"
@@ -116,9 +117,8 @@ def _read_days(
     sources = days.sources.values()
     of_days = [list(content) for source in sources for content in source["files"]]
     files = datasets.find(tracks) if tracks else []
-    if other := [
-        each for each in files if [each.name, *file_content(each)] not in of_days
-    ]:
+    other = [each for each in files if [each.name, *file_content(each)] not in of_days]
+    if other:
         raise DataError(
             f"{printable(other[0])}: is none of the files of the extracted days, unchanged"
         )

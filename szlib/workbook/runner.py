@@ -161,7 +161,8 @@ def choose_notebooks(scripts: Sequence[Path], only: Iterable[str]) -> list[Path]
     Raises DataError for an unknown name.
     """
     found = {name: [s for s in scripts if folders.has_name(s, name)] for name in only}
-    if unknown := [name for name, each in found.items() if not each]:
+    unknown = [name for name, each in found.items() if not each]
+    if unknown:
         known = ", ".join(script.stem for script in scripts)
         raise DataError(f"no notebook {', '.join(unknown)}; there are {known}")
     chosen = sum(found.values(), start=list[Path]())

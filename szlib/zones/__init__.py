@@ -2,11 +2,11 @@
 
 ellipses              ellipses in a person's frame, one or one for each speed
 enclosing_ellipse     the smallest ellipse around points or a curve
-outliers              encounters, or samples, far from all others (local outlier factor)
+outliers              encounters, or samples, far from all others (local outlier factor); smoothed paths
 estimators            what all estimators and shapes of zones have in common
 hulls                 the zone outside the convex hull over (x', y', speed): estimator "hull"
 respect               the ellipse that careful people keep out of, by the null model: estimator "respect"
-respect_likelihood    smoothed paths, their likelihood, and the posterior of its parameters
+respect_likelihood    its likelihood, and the posterior of its parameters
 respect_test          the test of the data against its null model, and the radius over all directions
 uncertainty           encounters by side, and confidence intervals by resampling people
 verdict               whether a zone can be used, and why not

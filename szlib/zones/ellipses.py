@@ -107,7 +107,8 @@ class Ellipse:
 
     def scaled(self, scale: float) -> Ellipse:
         """This ellipse of a person's frame, enlarged by the factor `scale` about the person."""
-        (m, n), (a, b) = self.center, self.semi_axes
+        m, n = self.center
+        a, b = self.semi_axes
         return Ellipse((scale * m, scale * n), (scale * a, scale * b), self.angle)
 
     def placed(self, position: ArrayLike, heading: float) -> Ellipse:
@@ -186,7 +187,8 @@ class EllipseZone:
 def find_neighbours(speeds: Iterable[float], speed: float) -> list[float]:
     """The `speeds` next to a `speed`, below and above; one if it is among them, or outside of them."""
     known = sorted(speeds)
-    below, above = [v for v in known if v <= speed], [v for v in known if v >= speed]
+    below = [v for v in known if v <= speed]
+    above = [v for v in known if v >= speed]
     return sorted({*below[-1:], *above[:1]})
 
 
@@ -197,10 +199,16 @@ def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:
     is NaN if the person is outside the ellipse.
     """
     m, n, a, b, angle = np.moveaxis(ellipses[..., None, :], -1, 0)
-    cos, sin, turn = np.cos(angle), np.sin(angle), directions - angle
-    u, v = np.cos(turn) / a, np.sin(turn) / b
-    x, y = (m * cos + n * sin) / a, (n * cos - m * sin) / b
-    p, q, r = u * u + v * v, u * x + v * y, x * x + y * y - 1
+    cos = np.cos(angle)
+    sin = np.sin(angle)
+    turn = directions - angle
+    u = np.cos(turn) / a
+    v = np.sin(turn) / b
+    x = (m * cos + n * sin) / a
+    y = (n * cos - m * sin) / b
+    p = u * u + v * v
+    q = u * x + v * y
+    r = x * x + y * y - 1
     with np.errstate(invalid="ignore"):
         return np.where(r < 0, (q + np.sqrt(q * q - p * r)) / p, np.nan)
 
@@ -234,10 +242,14 @@ def circle_around(zone: Ellipse) -> Ellipse:
     >>> round(circle_around(Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))).semi_axes[0], 6)
     1.1
     """
-    (m, n), (a, b) = zone.center, zone.semi_axes
-    c, s = cos(zone.angle), sin(zone.angle)
-    p, q = abs(m * c + n * s), abs(n * c - m * s)
-    low, high = 0.0, pi / 2
+    m, n = zone.center
+    a, b = zone.semi_axes
+    c = cos(zone.angle)
+    s = sin(zone.angle)
+    p = abs(m * c + n * s)
+    q = abs(n * c - m * s)
+    low = 0.0
+    high = pi / 2
     for _ in range(_BISECTIONS):
         t = (low + high) / 2
         rises = b * q * cos(t) - a * p * sin(t) - (a**2 - b**2) * sin(t) * cos(t) > 0

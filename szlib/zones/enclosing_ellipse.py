@@ -23,15 +23,19 @@ Curve = Callable[[Array], Array]
 
 _MIN_WIDTH = 1e-9  # width over length below which points count as collinear (a choice, far from any zone)
 # excess of the level that counts as rounding
-_POINT_TOLERANCE, _CURVE_TOLERANCE = 1e-13, 1e-12
+_POINT_TOLERANCE = 1e-13
+_CURVE_TOLERANCE = 1e-12
 # Newton decrements: each is below the square of the last
-_FULL_STEP, _CONVERGED = 0.25, 1e-8
-_TINY, _SQRT2 = 1e-15, np.sqrt(2)  # smaller singular values count as zero
+_FULL_STEP = 0.25
+_CONVERGED = 1e-8
+_TINY = 1e-15  # smaller singular values count as zero
+_SQRT2 = np.sqrt(2)
 # I - 3 e1 e1^T: gradients of log det M and 3 sum w
 _TARGET = np.array([-2.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 _ARC_SAMPLES = 25  # nodes of an arc; on an arc of a zone the level has one or two peaks
 # each zoom makes a bracket 8 times smaller: 8^-9 < sqrt(machine precision)
-_ZOOM, _N_ZOOMS = 8, 9
+_ZOOM = 8
+_N_ZOOMS = 9
 _MAX_ROUNDS = 50  # exchanges with a curve; a smooth curve needs about six
 
 
@@ -182,9 +186,11 @@ def _enclose(
         if level[farthest] <= 1 + _POINT_TOLERANCE or frozenset(support) in seen:
             break  # a support seen before differs by rounding only
         seen.add(frozenset(support))
-        active, weights = [*support, farthest], np.append(weights, 0.0)
+        active = [*support, farthest]
+        weights = np.append(weights, 0.0)
     axes, semi_axes, _ = np.linalg.svd(np.sqrt(2) * frame @ root[1:, 1:])
-    center, angle = origin + frame @ root[1:, 0], np.arctan2(axes[1, 0], axes[0, 0])
+    center = origin + frame @ root[1:, 0]
+    angle = np.arctan2(axes[1, 0], axes[0, 0])
     ellipse = Ellipse(tuple(center), tuple(semi_axes), angle, points[support])
     return _scale_to_contain(ellipse, points), support
 
@@ -192,15 +198,19 @@ def _enclose(
 def _find_large_triangle(points: Array) -> list[int]:
     """Indices of the two ends of the longer coordinate and of the point farthest from their line."""
     along = points[:, np.argmax(np.ptp(points, axis=0))]
-    first, last = int(np.argmin(along)), int(np.argmax(along))
-    edge, offset = points[last] - points[first], points - points[first]
+    first = int(np.argmin(along))
+    last = int(np.argmax(along))
+    edge = points[last] - points[first]
+    offset = points - points[first]
     # areas of the triangles
     doubled = np.abs(offset[:, 0] * edge[1] - offset[:, 1] * edge[0])
-    apex, length = int(np.argmax(doubled)), np.hypot(*edge)
+    apex = int(np.argmax(doubled))
+    length = np.hypot(*edge)
     rounding = 64 * np.finfo(float).eps * np.max(np.abs(points))
     if doubled[apex] > length * max(_MIN_WIDTH * length, rounding):
         return [first, last, apex]
-    if (distinct := len(np.unique(points, axis=0))) < 3:
+    distinct = len(np.unique(points, axis=0))
+    if distinct < 3:
         raise ZoneError(
             f"an ellipse needs at least 3 distinct points; got {distinct}: add points"
         )
@@ -225,7 +235,8 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
     digits. A row is dropped when its weight would become negative. (Six points on one conic have a singular
     R. The step then goes along its kernel until a row is dropped: Caratheodory's reduction to five.)
     """
-    rows, last = np.arange(len(q)), np.inf
+    rows = np.arange(len(q))
+    last = np.inf
     while True:
         root = _root(q[rows], weights)
         x, y, z = np.linalg.solve(root, q[rows].T)
@@ -243,7 +254,8 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
         is_complete = limits[dropped] > length
         weights = np.maximum(weights + min(length, limits[dropped]) * step, 0)
         if not is_complete:
-            rows, weights = np.delete(rows, dropped), np.delete(weights, dropped)
+            rows = np.delete(rows, dropped)
+            weights = np.delete(weights, dropped)
         weights /= np.sum(weights)
         if is_complete and (
             decrement < _CONVERGED or last <= decrement < _FULL_STEP
@@ -283,10 +295,13 @@ def _find_peaks(
     the highest exceeds the lowest.
     """
     level = np.pad(ellipse.level(samples), ((0, 0), (1, 1)), constant_values=-np.inf)
-    before, here, after = level[:, :-2], level[:, 1:-1], level[:, 2:]
+    before = level[:, :-2]
+    here = level[:, 1:-1]
+    after = level[:, 2:]
     may_exceed = 2 * here - np.minimum(before, after) >= 1 - _CURVE_TOLERANCE
     arc, best = np.nonzero((here >= before) & (here >= after) & may_exceed)
-    grid, rows = angles[arc], np.arange(len(arc))
+    grid = angles[arc]
+    rows = np.arange(len(arc))
     spacing = np.max(np.diff(grid, axis=1), axis=1)
     for _ in range(_N_ZOOMS):
         ends = np.clip([best - 1, best + 1], 0, grid.shape[1] - 1)

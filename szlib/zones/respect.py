@@ -198,7 +198,8 @@ class RespectEstimator(Estimator):
         """
         ellipses = zone_ellipses(self.draws.values, speeds)
         ellipses = np.where(_is_across(ellipses), _exchange_axes(ellipses), ellipses)
-        mean, spread = ellipses.mean(axis=0), np.maximum(ellipses.std(axis=0), 1e-9)
+        mean = ellipses.mean(axis=0)
+        spread = np.maximum(ellipses.std(axis=0), 1e-9)
         wide = mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)
         middle = zone_ellipses(self.middle[None], speeds)
         wide = np.where(_is_across(middle), _exchange_axes(wide), wide)

@@ -1,7 +1,4 @@
-"""The likelihood of the respect zone, and the posterior of its parameters: the formulas are in `respect`.
-
-Paths are smoothed first: the nearest of several noisy positions is too near, by 8 cm for a noise of 5 cm.
-"""
+"""The likelihood of the respect zone, and the posterior of its parameters: the formulas are in `respect`."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 
 from ..core.checks import Array, check_columns, check_rows
 from ..encounters.kinds import WALKING
-from .outliers import encounter_numbers
+from .outliers import encounter_numbers, smooth_paths
 from .sampling import Draws, sample
 
 REFERENCE_SPEED = 1.1  # at which the parameters describe the ellipse [m/s]
@@ -59,19 +56,21 @@ _REPORTED = 9  # the ellipse, and the share f of careless people
 # Spread of the first draws, as a share of the bounds: the data tells the ellipse better than f, w, A and c.
 _FIRST_SPREAD = np.repeat([0.02, 0.15, 0.05], [8, 1, 3])
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
-_NEWTON, _EXACT = 30, 1e-5  # steps of its logarithm to the mean of g, and the last one
+_NEWTON = 30  # most steps of its logarithm to the mean of g
+_EXACT = 1e-5  # the last step
 _BANK = 24  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
-# number of best circles tried, and the least difference of their radii [m]
-_STARTS, _START_GAP = 3, 0.15
-# How far back the centre is moved to look for another peak [m], and the least gain in log density for which
-# it is moved on.
-_BACK, _GAIN = ((-0.15, -0.1, -0.05, 0.05, 0.1, 0.15), 0.5)
-# Paths are smoothed over this time before and after [s] (measured: 0.5 s leaves an effect of 5 cm noise).
-SMOOTHING = 0.7
-
-_DEGREE = 2  # of the smoothing polynomial
-_TICK = 0.1  # time between samples [s]
+_STARTS = 3  # number of best circles tried
+_START_GAP = 0.15  # least difference of their radii [m]
+_BACK = (
+    -0.15,
+    -0.1,
+    -0.05,
+    0.05,
+    0.1,
+    0.15,
+)  # moves of the centre, to look for another peak [m]
+_GAIN = 0.5  # least gain in log density for which it is moved on
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,8 @@ class PairPaths:
         views = []
         for angle, own_speed, slowest in _VIEWS:
             theta, r = smooth_paths(samples, angle)
-            own, path = samples[own_speed].to_numpy(float), r * np.exp(1j * theta)
+            own = samples[own_speed].to_numpy(float)
+            path = r * np.exp(1j * theta)
             has_zone = np.isfinite(path) & (own >= slowest)
             carried = np.clip(own, *_SPEED_BOUNDS) - REFERENCE_SPEED
             view = pd.DataFrame(
@@ -162,7 +162,8 @@ class PairPaths:
         by_y = k * v * by_b
         by_x = k * u * by_a - by_y * p[7]
         shear = -by_y * u / by_a
-        by_a, by_b = h / 2 - k * u * u, h / 2 - k * v * v
+        by_a = h / 2 - k * u * u
+        by_b = h / 2 - k * v * v
         slopes = (
             -by_x,
             -by_x * speed,
@@ -183,9 +184,11 @@ def _signed_distances(x: Array, y: Array, speed: Array, p: Array) -> tuple[Array
     distance to the circle is multiplied by the geometric mean of the semi-axes.
     """
     p = p.astype(x.dtype)
-    by_a, by_b = np.exp(-p[3] - p[4] * speed), np.exp(-p[5] - p[6] * speed)
+    by_a = np.exp(-p[3] - p[4] * speed)
+    by_b = np.exp(-p[5] - p[6] * speed)
     ahead = x - p[0] - p[1] * speed
-    u, v = ahead * by_a, (y - p[2] - p[7] * ahead) * by_b
+    u = ahead * by_a
+    v = (y - p[2] - p[7] * ahead) * by_b
     return (np.sqrt(u * u + v * v) - 1) / np.sqrt(by_a * by_b), u, v, by_a, by_b
 
 
@@ -210,7 +213,8 @@ def respect_factor(
     h : distance to the edge of the zone [m], negative inside.
     f, w, excess, reach : share of careless people, softness [m], A and c [m], of shapes that broadcast.
     """
-    s, outside = expit(h / w), np.maximum(h, 0) / reach
+    s = expit(h / w)
+    outside = np.maximum(h, 0) / reach
     near = excess * np.exp(-outside)
     return f + (1 - f) * s * (1 + near), s, near, outside
 
@@ -226,13 +230,15 @@ def _factor_and_slopes(h: Array, p: Array) -> tuple[Array, Array, Array]:
     g, s, near, outside = respect_factor(h, f, w, excess, reach)
     out = (1 - f) * s
     by_h = out * ((1 - s) / w * (1 + near) - near / reach * (h > 0))
-    by_f, by_w = f * (1 - f) * (1 - s * (1 + near)), -out * (1 - s) * (1 + near) * h / w
+    by_f = f * (1 - f) * (1 - s * (1 + near))
+    by_w = -out * (1 - s) * (1 + near) * h / w
     return g, by_h, np.stack([by_f, by_w, out * near, out * near * outside], axis=1)
 
 
 def _minus_log_prior(p: Array) -> tuple[float, Array]:
     """Minus the logarithm of the prior density, up to a constant, and its gradient."""
-    deviation, elongation = (p - _MEAN) / _SPREAD, (p[3] - p[5]) / _ELONGATION
+    deviation = (p - _MEAN) / _SPREAD
+    elongation = (p[3] - p[5]) / _ELONGATION
     gradient = deviation / _SPREAD
     gradient[3] += elongation / _ELONGATION
     gradient[5] -= elongation / _ELONGATION
@@ -250,8 +256,10 @@ def chance_level(g: Array, g_null: Array) -> tuple[float, float]:
     The likelihood is maximised over all distributions N on the encounters seen, and over the mean (Qin,
     Biometrika 85, 1998): it is that of a logistic regression that tells data from null model.
     """
-    n, m = len(g), len(g_null)
-    both, level = np.concatenate([g, g_null]), g_null.mean()
+    n = len(g)
+    m = len(g_null)
+    both = np.concatenate([g, g_null])
+    level = g_null.mean()
     for _ in range(_NEWTON):
         share = both / (both + m / n * level)
         step = (share.sum() - n) / np.maximum(share @ (1 - share), 1e-9)
@@ -278,7 +286,8 @@ class Likelihood:
     @cached_property
     def kinds(self) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
         """For each kind of encounter, whether each of the data and of the null model is of it."""
-        kind, null_kind = self.data.kind, self.null.kind
+        kind = self.data.kind
+        null_kind = self.null.kind
         return [(kind == each, null_kind == each) for each in np.unique(kind)]
 
     def log_ratio(self, p: Array, h: Array, h_null: Array) -> float:
@@ -294,7 +303,8 @@ class Likelihood:
 
     def log_posterior(self, p: Array) -> float:
         """Logarithm of the posterior density of the parameters `p`; 0 without a zone."""
-        h, h_null = self.data.distances(p), self.null.distances(p)
+        h = self.data.distances(p)
+        h_null = self.null.distances(p)
         return self.log_ratio(p, h, h_null) - _minus_log_prior(p)[0]
 
     def cost(self, p: Array) -> tuple[float, Array]:
@@ -304,9 +314,11 @@ class Likelihood:
         g, by_h, by_p = _factor_and_slopes(h, p)
         h_null, slope_null = self.null.distances_and_slopes(p)
         g_null, by_h_null, by_p_null = _factor_and_slopes(h_null, p)
-        per, per_null = 1 / g, np.zeros(len(g_null))
+        per = 1 / g
+        per_null = np.zeros(len(g_null))
         for of_data, of_null in self.kinds:
-            near, far = g[of_data], g_null[of_null]
+            near = g[of_data]
+            far = g_null[of_null]
             level, log_ratio = chance_level(near, far)
             value -= log_ratio
             expected = len(far) / len(near) * level
@@ -397,7 +409,8 @@ def zone_ellipses(parameters: Array, speeds: Sequence[float]) -> Array:
     p = parameters.T[..., None]
     speed = np.clip(speeds, *_SPEED_BOUNDS) - REFERENCE_SPEED
     ahead = p[0] + p[1] * speed
-    by_a, by_b = np.exp(-p[3] - p[4] * speed), np.exp(-p[5] - p[6] * speed)
+    by_a = np.exp(-p[3] - p[4] * speed)
+    by_b = np.exp(-p[5] - p[6] * speed)
     shear = -p[7] * by_b
     form = np.array([[by_a**2 + shear**2, shear * by_b], [shear * by_b, by_b**2]])
     values, vectors = np.linalg.eigh(np.moveaxis(form, [0, 1], [-2, -1]))
@@ -405,42 +418,3 @@ def zone_ellipses(parameters: Array, speeds: Sequence[float]) -> Array:
     angle = np.pi / 2 - (np.pi / 2 - np.arctan2(major[..., 1], major[..., 0])) % np.pi
     left = np.broadcast_to(p[2], ahead.shape)
     return np.stack([ahead, left, *np.moveaxis(values, -1, 0) ** -0.5, angle], axis=-1)
-
-
-def smooth_paths(
-    samples: pd.DataFrame, column: str = "los_angle"
-) -> tuple[Array, Array]:
-    """Line-of-sight angle [rad] and distance [m] of `samples` (n,) along smoothed paths, in the same order.
-
-    The angle is that of a `column`: los_angle, or other_los_angle.
-
-    Local polynomials of degree 2 over +-`SMOOTHING` (Savitzky & Golay, 1964) smooth each encounter, but not
-    across a gap in time. Straight and evenly curved paths do not change. Without a column `t`, no path does.
-    """
-    angle, distance = samples[[column, "distance"]].to_numpy(float).T
-    if "t" not in samples:
-        return angle, distance
-    number, t = encounter_numbers(samples)[0], samples["t"].to_numpy(float)
-    order = np.lexsort([t, number])
-    path = (distance * np.exp(1j * angle))[order]
-    is_gap = np.abs(np.diff(t[order]) - _TICK) > _TICK / 2
-    is_end = is_gap | (np.diff(number[order]) != 0)
-    starts = np.flatnonzero(np.append(True, is_end))
-    lengths = np.diff(np.append(starts, len(path)))
-    for length in np.unique(lengths[lengths > _DEGREE + 1]):
-        rows = starts[lengths == length][:, None] + np.arange(length)
-        path[rows] = path[rows] @ _smoothing_matrix(length).T
-    path = path[np.argsort(order)]
-    return np.angle(path), np.abs(path)
-
-
-def _smoothing_matrix(length: int) -> Array:
-    """Matrix (length, length) that replaces each of evenly spaced samples by its local polynomial."""
-    half = round(SMOOTHING / _TICK)
-    matrix = np.zeros((length, length))
-    for i in range(length):
-        near = np.arange(max(0, i - half), min(length, i + half + 1))
-        matrix[i, near] = np.linalg.pinv(
-            np.vander((near - i) / half, _DEGREE + 1, increasing=True)
-        )[0]
-    return matrix

@@ -53,8 +53,8 @@ from ..core.errors import ZoneError, warn
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
 from ..encounters.sensor import SensorCheck
-from .outliers import R_MAX, nearest_approaches
-from .respect_likelihood import EXCESS_PRIOR, respect_factor, smooth_paths
+from .outliers import R_MAX, nearest_approaches, smooth_paths
+from .respect_likelihood import EXCESS_PRIOR, respect_factor
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
@@ -68,7 +68,8 @@ _IGNORING = np.array([0.0, *expit(np.linspace(-6, 4, 15))])
 _EXCESS = [(0.0, 1.0), *product((0.3, 1.0, 4.0, 16.0), (0.02, 0.08, 0.2, 0.5))]
 _MODEL_ERROR = 0.02  # [m]
 _FARTHEST = 0.8  # largest R, in r_max: beyond it people at a distance are hardly seen
-_N_RADII, _N_BINS = 160, 80  # values of R up to there, and bins of r up to r_max
+_N_RADII = 160  # values of R up to there
+_N_BINS = 80  # of r, up to r_max
 _LEVEL = 0.95
 
 
@@ -156,7 +157,8 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
         )
     n, m = np.sum(strata, axis=(0, 2))
     radii = np.arange(_N_RADII) / _N_RADII * _FARTHEST * r_max
-    h, softness = r - radii[:, None, None, None], _SOFTNESS[:, None, None]
+    h = r - radii[:, None, None, None]
+    softness = _SOFTNESS[:, None, None]
     share = _IGNORING[:, None]
     mean, spread = EXCESS_PRIOR
     found: list[tuple[Array, Array]] = []  # by R, w and f
@@ -176,9 +178,12 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
     is_likely = 2 * (likelihood.max() - likelihood) <= chi2.ppf(_LEVEL, 1) * (1 + n / m)
     is_zone = _IGNORING < 0.5
     every = np.broadcast_to(radii[:, None, None] * is_zone, likelihood.shape)
-    best, least = likelihood.argmax(), every[is_likely].min()
-    at, most = every.flat[best], every[is_likely].max()
-    low, high = min(least, max(at - _MODEL_ERROR, 0.0)), max(most, at + _MODEL_ERROR)
+    best = likelihood.argmax()
+    least = every[is_likely].min()
+    at = every.flat[best]
+    most = every[is_likely].max()
+    low = min(least, max(at - _MODEL_ERROR, 0.0))
+    high = max(most, at + _MODEL_ERROR)
     radius, low, high = np.round([at, low, high], 2).tolist()
     return RespectRadius(
         radius,
@@ -293,7 +298,8 @@ def null_test(
     _warn_about_kinds(samples, null)
     found = collect_approaches(samples, null, excluded_below=excluded_below)
     p_value, (statistic, *null_statistics) = _compare(found, null.shifts)
-    sensor, p_beyond = null.sensor, None
+    sensor = null.sensor
+    p_beyond = None
     if sensor is not None and sensor.loses_people:
         far = found[found["nearest"] >= sensor.resolved]
         p_beyond = _compare(far, null.shifts)[0] if (far["shift"] == 0).any() else 1.0
@@ -322,7 +328,8 @@ def _compare(found: pd.DataFrame, n_shifts: int) -> tuple[float, list[float]]:
 
 def _fit_null_radius(found: pd.DataFrame, null: NullEncounters) -> float:
     """The largest low end of the radius that some shifts have, each against all others [m]; 0: none."""
-    radii, others = [0.0], found[found["shift"] > 0]
+    radii = [0.0]
+    others = found[found["shift"] > 0]
     for k in range(1, 1 + min(_NULL_DRAWS, null.shifts - 1)):
         as_data = others.assign(shift=others["shift"].where(others["shift"] != k, 0))
         with suppress(ZoneError):  # no encounter of a kind of the others
@@ -340,7 +347,8 @@ def _find_deficits(found: pd.DataFrame, shifts: int) -> Array:
     for _, of_kind in found.groupby("kind"):
         count = np.histogram2d(of_kind["shift"], of_kind["nearest"], bins)[0]
         within = count.cumsum(axis=1)
-        k, n = within[:, :-1], within[:, -1:]
+        k = within[:, :-1]
+        n = within[:, -1:]
         total = n.sum()
         share = k.sum(axis=0) / total
         deficit = deficit + n * share - k

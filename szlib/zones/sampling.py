@@ -22,9 +22,12 @@ from scipy.stats import multivariate_t
 
 from ..core.checks import Array
 
-R_HAT, EFFECTIVE = 1.01, 400
+R_HAT = 1.01
+EFFECTIVE = 400
 _ENOUGH = 500  # effective draws, more than needed: to stop by luck costs little
-_GROUPS, _DRAWN, _MOST_ROUNDS = 4, 300, 60  # draws of a round
+_GROUPS = 4
+_DRAWN = 300  # draws of a round
+_MOST_ROUNDS = 60
 _FREEDOM = 5.0  # degrees of freedom of the t distributions: long tails
 _FEWEST = 5  # effective draws for each parameter to which a t distribution is fitted
 _KEPT = 4000  # equally likely draws in the end
@@ -97,7 +100,8 @@ def sample(
         return log_density(p) if is_inside else -np.inf
 
     variance = (spread * (high - low)) ** 2
-    values, log_f = np.empty((0, len(start))), np.empty(0)
+    values = np.empty((0, len(start)))
+    log_f = np.empty(0)
     proposals = [(start, np.diag(variance))]
     while True:
         drawn = multivariate_t.rvs(
@@ -156,9 +160,11 @@ def diagnose(values: Array, log_weight: Array) -> tuple[float, float]:
     >>> r_hat < 1.01, round(n)
     (True, 2000)
     """
-    means, variances = [], []
+    means = []
+    variances = []
     for group in range(_GROUPS):
-        weight, of_group = _weigh(log_weight[group::_GROUPS]), values[group::_GROUPS]
+        weight = _weigh(log_weight[group::_GROUPS])
+        of_group = values[group::_GROUPS]
         means.append(weight @ of_group)
         variances.append(weight @ (of_group - means[-1]) ** 2)
     ratio = np.var(means, axis=0, ddof=1) / np.mean(variances, axis=0)

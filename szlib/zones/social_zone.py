@@ -60,7 +60,8 @@ if TYPE_CHECKING:
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
 
-FORMAT, VERSION = "szlib.SocialZone", 5
+FORMAT = "szlib.SocialZone"
+VERSION = 5
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
 # The methods of `SocialZone.fit`: the estimator, and its options.
@@ -326,7 +327,8 @@ class SocialZone:
         the range and the missing directions, if the zone is undefined.
         """
         ellipse = self.ellipses.get(float(speed)) or self.shape.ellipse(speed)
-        if missing := self.missing_data(speed):
+        missing = self.missing_data(speed)
+        if missing:
             warn(missing)
         return ellipse
 
@@ -480,14 +482,16 @@ def _fit_ellipses(
     shape: ZoneShape, speeds: Sequence[float], samples: pd.DataFrame
 ) -> tuple[dict[float, Ellipse], dict[float, str]]:
     """The ellipse of a `shape` at each of the `speeds`, and why there is none; ZoneError if all lack one."""
-    ellipses, undefined = {}, {}
+    ellipses = {}
+    undefined = {}
     for speed in speeds:
         try:
             ellipses[speed] = shape.ellipse(speed)
         except ZoneError as error:
             undefined[speed] = str(error)
     if not ellipses:
-        reasons, median = "; ".join(undefined.values()), samples["speed"].median()
+        reasons = "; ".join(undefined.values())
+        median = samples["speed"].median()
         raise ZoneError(
             f"no speed has a zone: {reasons}; half of the samples are slower than {median:.1f} m/s: "
             "choose a speed near that, or add data"
@@ -555,7 +559,8 @@ def _read_content(path: Path) -> dict[str, Any]:
 
 def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
-    r_max, hull = float(content["r_max"]), content["hull_vertices"]
+    r_max = float(content["r_max"])
+    hull = content["hull_vertices"]
     ellipses = {
         float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"])
         for e in content["ellipses"]

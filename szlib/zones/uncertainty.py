@@ -51,9 +51,10 @@ LEVEL = 0.95  # share of data sets whose interval contains the limit
 N_RESAMPLES = 200  # zones estimated again for the intervals (assumed)
 # Quantities with intervals: centre and semi-axes [m], angle [deg], area [m2].
 QUANTITIES = ("center_x", "center_y", "a", "b", "angle_deg", "area")
-# Share of the pairs in a subsample, and rate at which a hull in d = 3 dimensions approaches a smooth body,
-# n^-(2 / (d + 1)) (Barany, Math. Ann. 285, 1989); measured on plazas: 0.49.
-SUBSAMPLE, RATE = 0.25, 0.5
+SUBSAMPLE = 0.25  # share of the pairs in a subsample
+# Rate at which a hull in d = 3 dimensions approaches a smooth body, n^-(2 / (d + 1)) (Barany, Math. Ann. 285,
+# 1989); measured on plazas: 0.49.
+RATE = 0.5
 
 _MAX_BIAS = 1.0  # largest bias that is corrected [standard deviations]
 _MAX_FAILED = 0.1  # share of resamples without a zone beyond which there is no interval

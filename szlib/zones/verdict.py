@@ -16,7 +16,9 @@ import numpy as np
 
 from .ellipses import find_neighbours
 
-USABLE, UNDECIDED, NO_RESPECT = "usable", "undecided", "no respect shown"
+USABLE = "usable"
+UNDECIDED = "undecided"
+NO_RESPECT = "no respect shown"
 # Encounters that a description needs (paper, hull): on real people the intervals of fewer hold the
 # truth too rarely (measured).
 MIN_TOTAL = 600
@@ -89,7 +91,8 @@ def describe_missing_encounters(provenance: Mapping[str, Any]) -> str:
 
     The interval of the respect zone itself says whether there were enough: see `_width`.
     """
-    n, hours = provenance.get("encounters"), provenance.get("hours")
+    n = provenance.get("encounters")
+    hours = provenance.get("hours")
     method = provenance.get("parameters", {}).get("method")
     if not n or n >= MIN_TOTAL or method == "respect":
         return ""

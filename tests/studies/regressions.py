@@ -28,7 +28,7 @@ HULL = (
     "(self.r_max - self.reach(theta))",
     "(self.r_max - 0.95 * self.reach(theta))",
 )
-PATHS = "zones/respect_likelihood.py", "_DEGREE = 2  #", "_DEGREE = 1  #"
+PATHS = "zones/outliers.py", "_DEGREE = 2  #", "_DEGREE = 1  #"
 LEVEL = "zones/uncertainty.py", "LEVEL = 0.95  #", "LEVEL = 0.8  #"
 RESPECT = (
     "zones/respect_test.py",

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from helpers.passers import passers
 
-from szlib.zones.respect_likelihood import smooth_paths
+from szlib.zones.outliers import smooth_paths
 
 
 @pytest.fixture(scope="module")

@@ -121,7 +121,8 @@ class DataCache:
 
     def encounters(self) -> pd.DataFrame:
         """The encounters that notebook 02 stored, or the same found now."""
-        if content := load_cached(self._path("encounters.parquet"), self.source()):
+        content = load_cached(self._path("encounters.parquet"), self.source())
+        if content:
             return pd.read_parquet(io.BytesIO(content))
         samples = find_encounters(self.tracks(), settings=self.settings)
         return self.store_encounters(samples)
@@ -194,11 +195,12 @@ class DataCache:
         with unchanged_files(files):
             found = [[file.name, *file_content(file)] for file in files]
             self.contents.extend([] if self.contents else found)
-            if changed := [
+            changed = [
                 file
                 for file, now in zip(files, found, strict=True)
                 if now not in self.contents
-            ]:
+            ]
+            if changed:
                 raise DataError(
                     f"{printable(changed[0])}: has changed since it was first read; run again"
                 )

@@ -34,7 +34,8 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
     parameter value badge    why
        window   3 s paper sec. 2
     """
-    if unknown := {badge for _, _, badge, _ in rows}.difference(BADGES):
+    unknown = {badge for _, _, badge, _ in rows}.difference(BADGES)
+    if unknown:
         raise ValueError(f"badges must be {', '.join(BADGES)}; got {sorted(unknown)}")
     return _style(
         _FoldedTable, pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"])

@@ -103,7 +103,8 @@ class NotebookRecord:
             )
         data = variables["data"]
         contents = []
-        if run := os.environ.get(folders.RUN_VARIABLE):
+        run = os.environ.get(folders.RUN_VARIABLE)
+        if run:
             self.out = Path(run)
             contents = read_json_object(self.out / folders.PARAMETERS).get("files", [])
         else:

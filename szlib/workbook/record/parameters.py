@@ -131,7 +131,8 @@ def check_parameters(
     for notebook in notebooks:
         for name, value in read_defaults(notebook).items():
             defaults.setdefault(name, []).append(value)
-    if unknown := sorted(given.keys() - defaults.keys()):
+    unknown = sorted(given.keys() - defaults.keys())
+    if unknown:
         raise DataError(
             f"unknown parameter {', '.join(map(ascii, unknown))}; the notebooks know "
             f"{', '.join(sorted(defaults))}"
