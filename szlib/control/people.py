@@ -18,9 +18,7 @@ A sensor is noisy and late, and loses people. By the ids of people,
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
-from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from math import atan2, dist, hypot, inf
@@ -361,11 +359,13 @@ class Tracker:
         now = check_finite("now", now)
         self._set_clock(now)
         try:
-            if not isinstance(people, list | tuple):
+            if not isinstance(people, (list, tuple)):
                 people = np.asarray(people, float)
             names = [getattr(each, "id", None) for each in people]
             names = names if ids is None else list(ids)
-            given = Counter(names)
+            given = dict.fromkeys(names, 0)
+            for name in names:
+                given[name] += 1
             times = [now] * len(people)
             if stamps is not None:
                 times = np.full(len(people), stamps, float).tolist()
@@ -429,7 +429,7 @@ class Tracker:
         return Person((x, y), velocity, id=name, heading_unknown=is_slow), is_usable
 
     def _find_lost(
-        self, person: Person, time: float, given: Counter[Hashable]
+        self, person: Person, time: float, given: dict[Hashable, int]
     ) -> _LastSeen | None:
         """What is known of a `person` whose id is new, by their place; it is not theirs any more."""
         away = {
@@ -455,9 +455,12 @@ class Tracker:
 
 def check_finite(name: str, value: Any, least: float = -1e300) -> float:
     """A `value` as a Python float; SolverError if it is no finite number, or below the `least`."""
-    number = inf
-    with suppress(TypeError, ValueError, OverflowError):
+    try:
         number = float(value)
-    is_finite, expected = abs(number) < inf, f"a finite number, at least {least:g}"
-    require(is_finite and number >= least, name, value, expected, SolverError)
+    except (TypeError, ValueError, OverflowError):
+        number = inf
+    if not (abs(number) < inf and number >= least):
+        raise SolverError(
+            f"{name} must be a finite number, at least {least:g}; got {value!r}"
+        )
     return number
