@@ -104,15 +104,6 @@ def test_invalid_arguments_raise(tracks, null):
         szlib.null_encounters(tracks, shifts=1, progress=False, min_distanse=1.0)
 
 
-def test_the_real_day(real_tracks):
-    null = szlib.null_encounters(real_tracks, shifts=1, seed=2, progress=False)
-    whole = szlib.find_encounters(szlib.time_shifted(real_tracks, seed=(2, 0)))
-    np.testing.assert_array_equal(
-        null.encounters["nearest"], whole.groupby("encounter")["distance"].min()
-    )
-    np.testing.assert_array_equal(
-        null.encounters["kind"], whole.groupby("encounter")["kind"].first()
-    )
 
 
 def test_groups_do_not_look_like_respect():
