@@ -104,8 +104,6 @@ def test_invalid_arguments_raise(tracks, null):
         szlib.null_encounters(tracks, shifts=1, progress=False, min_distanse=1.0)
 
 
-
-
 def test_groups_do_not_look_like_respect():
     """Lone encounters of people of whom 70 % walk in groups abreast, and nobody reacts to anybody."""
     found = []

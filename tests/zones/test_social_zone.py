@@ -517,21 +517,6 @@ def test_any_zone_can_be_tested_against_a_null(samples):
     assert fit(samples).null_test is None
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({}, r"needs a null model; pass null=szlib\.null_encounters"),
-        (
-            {"null": made_null(20), "r_max": 1.5},
-            r"r_max is 1\.5 m, that of the null model 2\.0 m",
-        ),
-    ],
-)
-def test_respect_without_valid_null_is_refused(options, message):
-    with pytest.raises(szlib.ZoneError, match=message):
-        fit(passers(50), method="respect", **options)
-
-
 # --- what is not adequate ----------------------------------------------------------------------------
 
 
