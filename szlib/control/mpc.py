@@ -193,20 +193,18 @@ class MPCCBF(Controller):
     def _take_walls(self, walls: Any) -> None:
         self.walls = read_walls(walls)
         items = [Wall(*ends) for ends in self.walls.reshape(-1, 4).tolist()]
+        items += self.obstacles
         self._solids = find_solids(walls)
-        self._items = (*items, *self.obstacles)
-        self._fixed = Obstacles.of(self._items, self._s)
-        self._fixed_of_disc = Obstacles.of(self._items, self.settings)
+        self._fixed = Obstacles.of(items, self._s)
+        self._fixed_of_disc = Obstacles.of(items, self.settings)
         self._ways = WayFinder(self._fixed, self._s)
-        self._near_from, self._near_reach = (0.0, 0.0), 0.0
-        self._take_near(self._items)
+        self._take_near(range(len(items)), (inf, inf))
 
-    def _take_near(self, items: Sequence[Obstacle]) -> None:
+    def _take_near(self, near: Sequence[int], at: Point) -> None:
         """Take these as what is fixed near the robot, and those among them that it can always stop before."""
-        self._near_fixed = Obstacles.of(items, self._s)
-        walls = (each for each in items if each.is_fixed)
-        self._walls_near = Obstacles.of(walls, self.settings)
-        self._room: tuple[Point, float] = (0.0, 0.0), -inf
+        self._near, self._near_from = self._fixed.chosen(near), at
+        self._walls_near = self._fixed_of_disc.chosen(near).walls
+        self._room: tuple[Point, float] = at, -inf
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
@@ -239,7 +237,7 @@ class MPCCBF(Controller):
         self._clock = StepClock(self._s.dt)
         self.tracker.reset()
         self._planner.reset()
-        self._near_reach, self._room = 0.0, ((0.0, 0.0), -inf)
+        self._near_from = inf, inf
         self._ways.reset()
 
     def step(
@@ -339,9 +337,9 @@ class MPCCBF(Controller):
         A plan that violates a floor may be a poor local optimum, which leads through a wall; so it is
         compared with the one that is found from full braking.
         """
-        s, last = self._s, self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        target, fixed = heading.target, self._near_fixed
-        question = Question(scene.state, target, last, scene.zones, fixed)
+        s, state = self._s, scene.state
+        last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
+        question = Question(state, heading.target, last, scene.zones, self._near)
         guess = self._plan + self._change
         if s.solver == "ipopt":
             inputs = solve_by_ipopt(s, question, guess.clip(-s.a_max, s.a_max))
@@ -350,21 +348,18 @@ class MPCCBF(Controller):
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
             points = heading.ways[0].at(np.array(s.times))
-            along = plan_along(s, scene.state, points)
-            other = self._planner.plan(question, along)
-            better = other if other.rank < plan.rank else plan
-            plan = better._replace(timed_out=other.timed_out)
+            other = self._planner.plan(question, plan_along(s, state, points))
+            plan = min(plan, other, key=lambda each: each.rank)
+            plan = plan._replace(timed_out=other.timed_out)
+        braking = plan_braking(s, state[2:])
         if plan.violations == (inf,):
-            return "braking", plan._replace(inputs=plan_braking(s, scene.state[2:]))
-        if not plan.is_relaxed:
-            is_too_fast = hypot(*scene.state[2:]) > s.v_max + TOLERANCE
-            return "relaxed" if is_too_fast else "optimal", plan
+            return "braking", plan._replace(inputs=braking)
         if max(plan.violations, default=0.0) > 0.0 and not plan.timed_out:
-            braking = plan_braking(s, scene.state[2:])
             other = self._planner.plan(question, braking)
             if other.rank < plan.rank:
                 return "restarted", other
-        return "relaxed", plan
+        is_too_fast = hypot(*state[2:]) > s.v_max + TOLERANCE
+        return "relaxed" if plan.is_relaxed or is_too_fast else "optimal", plan
 
     def _guard(self, scene: Scene, plan: Plan) -> tuple[bool, tuple[bool, bool]]:
         """True if the robot is to brake (see this module), and what holds for what it does then.
@@ -404,12 +399,11 @@ class MPCCBF(Controller):
         stop, last = max(abs(last_vx), abs(last_vy)) / s.a_max, hypot(last_vx, last_vy)
         reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
         reach += s.r_robot - self.settings.r_robot
-        contact, is_body_far = BODY_RADIUS + self.settings.r_robot + reach, True
-        for person in scene.people:
-            (px, py), (wx, wy) = person.position, person.velocity
-            if hypot(px - x, py - y) < contact + (stop + 2 * s.dt) * hypot(wx, wy):
-                is_body_far = False
-                break
+        contact, time = BODY_RADIUS + self.settings.r_robot + reach, stop + 2 * s.dt
+        is_body_far = all(
+            dist(person.position, (x, y)) >= contact + time * hypot(*person.velocity)
+            for person in scene.people
+        )
         at, room = self._room
         if room - dist(at, (x, y)) < reach:
             room = float(self._walls_near.gaps(x, y).min(initial=inf))
@@ -451,17 +445,15 @@ class MPCCBF(Controller):
 
     def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
         """Take what can matter among everything fixed. Looked for once a metre: see `Obstacles.find_near`."""
-        s, speed = self._s, max(self._s.v_max, hypot(vx, vy))
-        if len(self._items) <= _FEW:
+        s, speed = self._s, hypot(vx, vy)
+        is_near = dist((x, y), self._near_from) <= 1.0 and speed <= s.v_max
+        if self._fixed.size <= _FEW or is_near:
             return
-        longest = max(s.step_lengths)
+        longest, speed = max(s.step_lengths), max(s.v_max, speed)
         time = s.times[-1] + 2 * longest * s.dt / (1 - (1 - s.gamma) ** longest)
         time = max(time, 2 * s.dt + speed / s.a_max)  # until it rests
-        reach = s.r_robot + s.eps + speed * time
-        if reach + dist((x, y), self._near_from) > self._near_reach:
-            self._near_from, self._near_reach = (x, y), reach + 1.0
-            near = self._fixed.find_near(x, y, self._near_reach)
-            self._take_near([self._items[i] for i in near])
+        reach = s.r_robot + s.eps + speed * time + 1.0
+        self._take_near(self._fixed.find_near(x, y, reach), (x, y))
 
     def _make_scene(
         self,
@@ -508,7 +500,7 @@ class MPCCBF(Controller):
             time = max(abs(vx), abs(vy)) / s.a_max
             target = x + vx * time / 2, y + vy * time / 2
         elif scene.people and not (heading and heading.ways):
-            zones, fixed = scene.zones.groups[0].numbers.tolist(), self._near_fixed
+            zones, fixed = scene.zones.groups[0].numbers.tolist(), self._near
             target = find_target(at, target, zones, fixed, s)
         if heading:
             return heading._replace(target=target)

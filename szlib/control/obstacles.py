@@ -25,7 +25,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.checks import Array, check_array
+from ..core.checks import Array, check_array, require
 from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .settings import MPCSettings
@@ -35,18 +35,21 @@ SHORTEST_WALL = 1e-3
 KNOT = 4  # numbers of each interval of a prediction
 
 
-def _measure_line(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
-    """Length of the segment (`xa`, `ya`) to (`xb`, `yb`), and g of (`x`, `y`) [m] (paper, eq. 3)."""
+def _project(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> tuple[Any, ...]:
+    """Length of the segment (`xa`, `ya`) to (`xb`, `yb`), and g of (`x`, `y`) and its place along [m].
+
+    The place is measured from the middle (paper, eq. 3).
+    """
     length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
-    return length, ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+    ux, uy = (xb - xa) / length, (yb - ya) / length
+    dx, dy = x - (xa + xb) / 2, y - (ya + yb) / 2
+    return length, dx * uy - dy * ux, dx * ux + dy * uy
 
 
 def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
     """Approximate distance of (`x`, `y`) to the segment (`xa`, `ya`) to (`xb`, `yb`) [m] (paper, eq. 3-5)."""
-    length, g = _measure_line(x, y, xa, ya, xb, yb)
-    t = (
-        (length / 2) ** 2 - (x - (xa + xb) / 2) ** 2 - (y - (ya + yb) / 2) ** 2
-    ) / length
+    length, g, along = _project(x, y, xa, ya, xb, yb)
+    t = ((length / 2) ** 2 - along**2 - g**2) / length
     return (g**2 + ((abs(t) - t) / 2) ** 2) ** 0.5
 
 
@@ -54,8 +57,7 @@ def euclidean_segment_formula(
     x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any
 ) -> Any:
     """Euclidean distance of (`x`, `y`) to the segment from (`xa`, `ya`) to (`xb`, `yb`) [m]."""
-    length, g = _measure_line(x, y, xa, ya, xb, yb)
-    along = ((x - (xa + xb) / 2) * (xb - xa) + (y - (ya + yb) / 2) * (yb - ya)) / length
+    length, g, along = _project(x, y, xa, ya, xb, yb)
     beyond = abs(along) - length / 2
     return (g**2 + ((abs(beyond) + beyond) / 2) ** 2) ** 0.5
 
@@ -164,17 +166,10 @@ def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
 
 def check_wall(wall: ArrayLike) -> Array:
     """End points of a `wall`, shape (2, 2) [m]; SolverError if it is shorter than `SHORTEST_WALL`."""
-    ends = check_array("wall", wall, (2, 2))
-    length = np.hypot(*(ends[1] - ends[0]))
-    if length == 0:
-        raise SolverError(
-            f"a wall needs two different end points; got {ends[0].tolist()} twice"
-        )
-    if length < SHORTEST_WALL:
-        raise SolverError(
-            f"a wall must be at least {SHORTEST_WALL} m long; got {length:.3g} m from {ends[0].tolist()}; "
-            "leave it out or join it to its neighbour"
-        )
+    ends = check_array("a wall", wall, (2, 2))
+    is_long = np.hypot(*(ends[1] - ends[0])) >= SHORTEST_WALL
+    expected = f"two different end points, at least {SHORTEST_WALL} m apart"
+    require(is_long, "a wall", ends.tolist(), expected, SolverError)
     return ends
 
 
@@ -194,6 +189,9 @@ class Priority(IntEnum):
     DECAY = 3
 
 
+_KINDS = dict[str, Any]()  # classes of obstacles by their kinds
+
+
 class Obstacle:
     """Base class of obstacles: derive from it, and write `distance`.
 
@@ -209,8 +207,8 @@ class Obstacle:
 
     Notes
     -----
-    `distance` must be convex along straight lines, also if the obstacle moves, and must not change by more
-    than the robot and the obstacle move.
+    `distance` must not change by more than the robot and the obstacle move, and should be convex: then plans
+    of a few iterations keep it.
 
     Examples
     --------
@@ -237,6 +235,7 @@ class Obstacle:
     def __init_subclass__(cls) -> None:
         if "kind" not in cls.__dict__:
             cls.kind = cls.__name__.lower()
+        _KINDS[cls.kind] = cls
 
     def __init__(self, *numbers: float) -> None:
         given = check_array(f"the numbers of a {self.kind}", numbers, (len(numbers),))
@@ -463,8 +462,7 @@ class HalfPlane(Obstacle):
         return (x - px) * nx + (y - py) * ny
 
 
-# Share of a piece of a path over which the slope of a distance is taken.
-_INSTANT = 1e-3
+_PARTS = 16  # of a piece of a path, between whose ends distances are bounded
 
 
 class Path(NamedTuple):
@@ -539,6 +537,23 @@ class Obstacles(NamedTuple):
         """These, and then the `others`."""
         return Obstacles(self.groups + others.groups, self.r_robot)
 
+    def chosen(self, near: Sequence[int]) -> Obstacles:
+        """Those with the numbers `near`, which increase."""
+        groups, first = list[Group](), 0
+        for kind, numbers, offsets in self.groups:
+            last = first + len(offsets)
+            own = [i - first for i in near if first <= i < last]
+            if own:
+                groups.append(Group(kind, numbers[own], offsets[own]))
+            first = last
+        return self._replace(groups=tuple(groups))
+
+    @property
+    def walls(self) -> Obstacles:
+        """Those that belong to the building: the robot can always stop before them."""
+        walls = [g for g in self.groups if g.kind.priority == Priority.WALL]
+        return self._replace(groups=tuple(walls))
+
     @property
     def size(self) -> int:
         """Number of obstacles."""
@@ -581,38 +596,25 @@ class Obstacles(NamedTuple):
 
         Notes
         -----
-        If the robot moved straight at a constant velocity between two points, as obstacles do, these
-        distances would be convex functions of time. Such a function lies above its tangents at both ends, so
-        nowhere below the point where they cross. The robot leaves that motion by at most the bow.
+        Each piece of the path is cut into `_PARTS`. Within one, no distance changes by more than the robot
+        and the obstacle move, so it is nowhere less than half of the sum of both ends less that way. The
+        robot leaves a uniform motion by at most the bow.
         """
         if not self.groups:
             return np.zeros(0), np.zeros(0)
-        measure: Any = self.h if is_barrier else self.gaps
-        start = path.points[:-1]
-        way, lasts = np.diff(path.points, axis=0), np.diff(path.times)
-        at_points = measure(*path.points.T, path.times)
-        first, last = at_points[:, :-1], at_points[:, 1:]
-        seen = last.min(axis=1, initial=np.inf)
-        bows = path.asides if are_fixed else path.bows
-        speeds = np.concatenate(
-            [kind.speeds(numbers) for kind, numbers, _ in self.groups]
+        n = len(path.bows)
+        parts = np.linspace(0.0, n, n * _PARTS + 1)
+        x, y, t = (
+            np.interp(parts, np.arange(n + 1), each)
+            for each in (*path.points.T, path.times)
         )
-        reach = np.hypot(*way.T) + speeds[:, None] * lasts
-        # no distance changes by more than the way
-        lower = (first + last - reach) / 2 - bows
-        if lower.min(initial=np.inf) >= 0:
-            return lower.min(axis=1, initial=np.inf), seen
-        after, before = (
-            measure(*(start + share * way).T, path.times[:-1] + share * lasts)
-            for share in (_INSTANT, 1 - _INSTANT)
-        )
-        falls, rises = (after - first) / _INSTANT, (last - before) / _INSTANT
-        with np.errstate(divide="ignore", invalid="ignore"):
-            crossing = first + falls * (last - rises - first) / (falls - rises)
-        ends = np.minimum(first, last)
-        is_dip = (falls < 0) & (rises > 0)
-        lower = np.where(is_dip, np.minimum(crossing, ends) - _INSTANT * reach, ends)
-        return (lower - bows).min(axis=1, initial=np.inf), seen
+        gaps = (self.h if is_barrier else self.gaps)(x, y, t)
+        speeds = np.concatenate([g.kind.speeds(g.numbers) for g in self.groups])
+        reach = np.hypot(np.diff(x), np.diff(y)) + speeds[:, None] * np.diff(t)
+        bows = np.repeat(path.asides if are_fixed else path.bows, _PARTS)
+        lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
+        seen = gaps[:, _PARTS::_PARTS]
+        return lower.min(axis=1, initial=np.inf), seen.min(axis=1, initial=np.inf)
 
     def find_near(self, x: float, y: float, reach: float) -> list[int]:
         """Places of the obstacles whose way s may be at most `reach` from (`x`, `y`) [m].
@@ -694,13 +696,9 @@ def describe(obstacle: Obstacle) -> dict[str, Any]:
 
 def restore(content: dict[str, Any]) -> Obstacle:
     """The obstacle that `describe` wrote as `content`; SolverError if no class has its kind."""
-    kinds, found = [Obstacle], list[type[Obstacle]]()
-    while kinds:
-        kinds += (kind := kinds.pop()).__subclasses__()
-        found.append(kind)
-    for kind in found:
-        if kind.kind == content["kind"]:
-            return rebuild(kind, content["numbers"])
-    raise SolverError(
-        f"no class of obstacles has the kind {content['kind']!r}; define it before the file is read"
+    kind: Any = _KINDS.get(content["kind"])
+    expected = (
+        "that of a class of obstacles, which must be defined before the file is read"
     )
+    require(kind, "the kind of an obstacle", content["kind"], expected, SolverError)
+    return rebuild(kind, content["numbers"])

@@ -14,9 +14,9 @@ from ..core.checks import Array
 from ..zones.ellipses import Ellipse
 from .obstacles import Obstacle, Obstacles, Path, Priority, find_bodies
 from .people import STANDING_SPEED, Person, TrackedPeople
-from .problem import build_horizon, list_conditions
+from .problem import build_horizon
 from .settings import TOLERANCE, MPCSettings
-from .verification import Report, Row, Sampled, verify_step
+from .verification import Report, Row, Rows, Sampled, list_rows, verify_step
 from .ways import Way
 
 Status = Literal["optimal", "relaxed", "restarted", "braking"]
@@ -230,32 +230,26 @@ class Step:
     @property
     def residual(self) -> Array:
         """h_{k+1} - (1-gamma)^m h_k for each step of m dt of the plan, shape (obstacles, N_h) [m]."""
-        s = self.asked.settings
-        x, y, *_ = self.planned[: s.N_h + 1].T
-        h = self.asked.barriers.h(x, y, np.array(s.times[: s.N_h + 1]))
-        keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h], float)
-        return h[:, 1:] - keep * h[:, :-1]
+        falls = [each.values for each in self._rows if each.level == Priority.DECAY]
+        return np.concatenate([np.zeros((0, self.asked.settings.N_h)), *falls])
 
-    def _find_violations(self, has_floors: bool) -> dict[Priority, float]:
-        """Largest violation of the conditions of each `Priority`, with or without floors [m]."""
-        scene, s, (x, y, *_) = self.asked, self.asked.settings, self.planned.T
-        obstacles, worst, i = scene.barriers, dict.fromkeys(Priority, 0.0), 0
-        if has_floors:
-            bodies = find_bodies(scene.zones, s, as_predicted=True)
-            obstacles = obstacles.joined(bodies)
-        h = obstacles.h(x, y, np.array(s.times))
-        for kind, _, offsets in obstacles.groups:
-            own, i = h[i : i + len(offsets)], i + len(offsets)
-            for level, keep in list_conditions(s, kind, has_floors):
-                n = len(keep)
-                left = own[:, 1 : n + 1] - np.array(keep) * own[:, :n]
-                worst[level] = max(worst[level], -float(left.min()))
-        return worst
+    @cached_property
+    def _rows(self) -> list[Rows]:
+        """The rows of every level at the states of the plan."""
+        scene, x = self.asked, self.planned
+        s = scene.settings
+        at = (*x.T[:2], np.array(s.times))
+        bodies = find_bodies(scene.zones, s, as_predicted=True)
+        return list(list_rows(scene, x, scene.barriers.h(*at), bodies.h(*at)))
 
     @cached_property
     def violations(self) -> dict[Priority, float]:
         """Largest violation by the plan of the conditions of each `Priority` [m]: see `control.planner`."""
-        return self._find_violations(has_floors=True)
+        worst = dict.fromkeys(Priority, 0.0)
+        for level, _, _, values in self._rows:
+            if level is not None:
+                worst[level] = max(worst[level], -float(values.min()))
+        return worst
 
     @cached_property
     def slack(self) -> float:
@@ -263,14 +257,8 @@ class Step:
 
         Also of rest at the end, if the plan must end there [m/s].
         """
-        s, velocity = self.asked.settings, self.planned[1:, 2:]
-        prices = {Priority.ZONE: s.zone_price, Priority.DECAY: s.decay_price}
-        worst = self._find_violations(has_floors=s.decay_price < inf)
-        found = [worst[each] for each in Priority if prices.get(each, inf) == inf]
-        found.append(float((velocity**2).sum(axis=1).max()) - s.v_max**2)
-        if s.terminal == "rest":
-            found.append(float(np.abs(velocity[-1]).max()))
-        return max(0.0, *found)
+        hard = [each for each in self._rows if each.is_hard(self.asked.settings)]
+        return max(0.0, *(-float(each.values.min()) for each in hard))
 
     @property
     def feasible(self) -> bool:

@@ -17,8 +17,8 @@ import shapely
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .obstacles import Wall, Zone
-from .settings import TOLERANCE
+from .obstacles import Priority, Wall, Zone
+from .settings import TOLERANCE, MPCSettings
 
 # Two computations of one number may differ by this much, relative to the largest number (at least 1).
 ROUNDING = 1e-7
@@ -41,6 +41,59 @@ class Row(NamedTuple):
     kind: str
     name: str
     value: float
+
+
+class Rows(NamedTuple):
+    """Rows of one level, of all obstacles of a kind.
+
+    Attributes
+    ----------
+    level : their priority; None: of the robot, which no obstacle changes.
+    kind : of the obstacles; "speed" or "end" for the speed limit and rest at the end.
+    first : number of the first obstacle.
+    values : negative where a row is violated, shape (obstacles, k) [as of `Row`].
+    """
+
+    level: Priority | None
+    kind: str
+    first: int
+    values: Array
+
+    def is_hard(self, s: MPCSettings) -> bool:
+        """True if no price can buy a violation, by the settings `s`."""
+        if self.level is None or s.decay_price == np.inf:
+            return self.level in (None, Priority.DECAY)
+        return self.level < Priority.ZONE + (s.zone_price == np.inf)
+
+
+def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
+    """The rows of every level at the states `x` of a plan, shape (N+1, 4).
+
+    `h` are the barriers there, and `gaps` those to bodies less `body_gap`, shape (n, N+1) each [m].
+    """
+    s, lengths, first = scene.settings, np.array(scene.settings.step_lengths), 0
+    stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
+    for kind, _, offsets in scene.barriers.groups:
+        own = h[first : first + len(offsets)]
+        falls = own[:, 1:] - (1 - s.gamma) ** lengths * own[:, :-1]
+        if kind.priority == Priority.WALL:
+            floors = own[:, 1:] - stop**lengths * own[:, :-1]
+            yield Rows(Priority.WALL, kind.kind, first, floors)
+        else:
+            last = s.N_h if kind.has_barrier else s.N
+            yield Rows(kind.priority, kind.kind, first, own[:, 1 : last + 1])
+        if kind.has_barrier:
+            yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
+        first += len(offsets)
+    if len(gaps):
+        yield Rows(Priority.BODY, "body", 0, gaps[:, 1:])
+    velocity = x[1:, 2:]
+    slower = s.v_max**2 - (velocity**2).sum(axis=1)
+    yield Rows(None, "speed", 0, slower[None])
+    if s.terminal == "rest":
+        speed = np.abs(velocity).max(axis=1)
+        is_end = np.arange(s.N) == s.N - 1
+        yield Rows(None, "end", 0, np.where(is_end, -speed, np.inf)[None])
 
 
 @dataclass(frozen=True)
@@ -83,11 +136,12 @@ class Sampled(NamedTuple):
 def verify_step(step: Any) -> Report:
     """Check the plan of a `step` (a `Step`), and its claims."""
     scene, s, x = step.scene, step.asked.settings, np.asarray(step.planned, float)
-    lasts = s.dt * np.array(s.grid or [1] * s.N)
-    way = _sample(np.array(step.asked.state), zip(step.inputs, lasts, strict=True))
+    lengths = np.array(s.step_lengths)
+    way = _sample(np.array(step.asked.state), step.inputs, s.dt * lengths)
     h = _measure(step.asked, x[:, :2], way.times[::PIECES], is_barrier=True)
-    residual = h[:, 1:] - (1 - s.gamma) ** (lasts / s.dt) * h[:, :-1]
-    worst = _find_worst(step.asked, x, h, residual)
+    residual = h[:, 1:] - (1 - s.gamma) ** lengths * h[:, :-1]
+    rows = list_rows(step.asked, x, h, _measure_bodies(step.asked, x))
+    worst = _find_worst(step.asked, (each for each in rows if each.is_hard(s)))
     path = step.carry(way).points
     within = path[:_SAMPLES], way.times[:_SAMPLES]
     of_disc = _measure(scene, *within, is_barrier=True)
@@ -100,7 +154,7 @@ def verify_step(step: Any) -> Report:
     least = float(of_disc[:, [0, -1]].min(initial=np.inf))
     lowest, feasible = min(least, gap), slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
-    compared = {
+    pairs = {
         "motion": (way.states, x),
         "motion of the disc": (path[::PIECES], step.predicted[:, :2]),
         "h": (of_disc[:, 0], step.h),
@@ -108,16 +162,20 @@ def verify_step(step: Any) -> Report:
         "slack": (slack, step.slack),
     }
     if step.of_point is None:
-        compared["control"] = step.control, step.inputs[0]
+        pairs["control"] = step.control, step.inputs[0]
+    errors = {
+        name: np.abs(np.subtract(*pair)).max(initial=0.0)
+        for name, pair in pairs.items()
+    }
+    errors["an acceleration beyond its bound"] = s.dt * (
+        np.abs(step.inputs).max() - s.a_max
+    )
     tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
-    faults = list[str]()
-    for name, each in compared.items():
-        error = np.abs(np.subtract(*each)).max(initial=0.0)
-        if not error <= tolerance:
-            faults.append(f"{name} differs by {error:.2g}")
-    beyond = np.abs(step.inputs).max() - s.a_max
-    if not beyond <= tolerance / s.dt:
-        faults.append(f"an acceleration is {beyond:.2g} m/s2 beyond its bound")
+    faults = [
+        f"{name} differs by {each:.2g}"
+        for name, each in errors.items()
+        if not each <= tolerance
+    ]
     undecided = min(abs(slack - TOLERANCE), abs(lowest + TOLERANCE)) <= tolerance
     # the bound of a step may be loose where somebody or the robot is fast
     fastest = max([np.hypot(*each.velocity) for each in scene.people], default=0.0)
@@ -127,18 +185,17 @@ def verify_step(step: Any) -> Report:
         faults.append(
             f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
         )
-    faults += _check_guard(step, lasts)
+    faults += _check_guard(step, s.dt * lengths)
     return Report(tuple(faults), worst, slack, least, gap, feasible, safe)
 
 
-def _sample(
-    state: Array, pieces: Iterable[tuple[Array, float]], rests_by: Any = None
-) -> Sampled:
-    """The way of a double integrator that holds each input for its time (paper, eq. 8).
+def _sample(state: Array, inputs: Array, lasts: Array, rests_by: Any = None) -> Sampled:
+    """The way of a double integrator that holds each of the `inputs` for its time (paper, eq. 8).
 
     Then it brakes as hard as it can, with the settings `rests_by`.
     """
-    points, times, states, todo = [state[None, :2]], [np.zeros(1)], [state], [*pieces]
+    points, times, states = [state[None, :2]], [np.zeros(1)], [state]
+    todo = list(zip(inputs, lasts, strict=True))
     s, shares = rests_by, np.linspace(0.0, 1.0, _SAMPLES)[1:]
     while todo or (s and np.abs(states[-1][2:]).max() > 1e-9):
         p, v = np.split(states[-1], 2)
@@ -163,55 +220,31 @@ def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
     is_fixed = np.array([each.is_fixed for each in scene.barriers.items], bool)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
     for n in (1, s.N):
-        inputs = zip(step.inputs[:n], lasts, strict=False)
-        way = step.carry(_sample(np.array(step.asked.state), inputs, s))
-        points = way.points
-        gaps = _measure(scene, points, way.times, as_predicted=False)
-        of_bodies = gaps[~is_fixed]
-        if n == 1 and step.walls_safe and (gaps[is_fixed] < -TOLERANCE).any():
+        asked = np.array(step.asked.state), step.inputs[:n], lasts[:n]
+        points, times, _ = step.carry(_sample(*asked, s))
+        gaps = _measure(scene, points, times, as_predicted=False)
+        touches = np.asarray((gaps < -TOLERANCE).any(axis=1))
+        if n == 1 and step.walls_safe and touches[is_fixed].any():
             yield "the step says that it can stop before every wall; it cannot"
-        overlaps = of_bodies[:, 0] < -TOLERANCE
-        ends = points[::PIECES] - points[0]
-        nearer = ((places - points[0]) @ ends.T > TOLERANCE).any(axis=1)
-        is_hit = np.where(overlaps, nearer, (of_bodies < -TOLERANCE).any(axis=1))
+        moved = points[::PIECES] - points[0]
+        nearer = ((places - points[0]) @ moved.T > TOLERANCE).any(axis=1)
+        overlaps = gaps[~is_fixed, 0] < -TOLERANCE
+        is_hit: Array = np.where(overlaps, nearer, touches[~is_fixed])
         rests = np.hypot(*np.ptp(points, axis=0)) <= AT_REST * s.dt
         is_clear.append(bool(rests or not is_hit.any()))
     if step.passively_safe and not any(is_clear):
         yield "the step says that it rests before somebody walks into it; it does not"
 
 
-def _find_worst(scene: Any, x: Array, h: Array, residual: Array) -> Row:
-    """The row without a price that has the smallest value, at the states `x` of a plan."""
-    s, lengths = scene.settings, np.array(scene.settings.grid or [1] * scene.settings.N)
-    has_floors, found = s.decay_price < np.inf, list[tuple[Array, str, str, int]]()
-    stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
-    condition = "the condition of {} from k = {} to {}"
-    for i, each in enumerate(scene.barriers.items):
-        if not each.has_barrier:
-            found.append((h[i, 1:], each.kind, condition, i))
-        elif not has_floors:
-            found.append((residual[i, : s.N_h], each.kind, condition, i))
-        elif each.is_fixed:
-            found.append(
-                (h[i, 1:] - stop**lengths * h[i, :-1], each.kind, condition, i)
-            )
-        elif s.zone_price == np.inf:
-            found.append((h[i, 1 : s.N_h + 1], each.kind, condition, i))
-        if has_floors and isinstance(each, Zone):
-            times = s.dt * np.cumsum([0, *lengths])
-            places, _ = _find_places(scene.people[i], times, s, True)
-            away = np.hypot(*(x[1:, :2] - places[1:]).T)
-            gap = away - BODY_RADIUS - s.r_robot - s.body_gap
-            name = condition.replace("of {}", "of the body of {}")
-            found.append((gap, "body", name, i))
-    slack = s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)
-    found.append((slack, "speed", "the speed limit at k = {2}", -1))
-    if s.terminal == "rest":
-        found.append((-np.abs(x[-1:, 2:]).max(axis=1), "end", "rest at the end", -1))
-    values, kind, name, i = min(found, key=lambda each: float(each[0].min()))
-    k = int(values.argmin())
-    of = scene.name(i) if i >= 0 else ""
-    return Row(kind, name.format(of, k, k + 1), float(values[k]))
+def _find_worst(scene: Any, rows: Iterable[Rows]) -> Row:
+    """The row without a price that has the smallest value."""
+    level, kind, first, values = min(rows, key=lambda each: float(each.values.min()))
+    i, k = np.unravel_index(values.argmin(), values.shape)
+    name = {"speed": "the speed limit", "end": "rest"}.get(kind, "")
+    if level is not None:
+        of = "the body of " if kind == "body" else ""
+        name = f"the condition of {of}{scene.name(first + int(i))}"
+    return Row(kind, f"{name} at k = {k + 1}", float(values[i, k]))
 
 
 def _measure(
@@ -244,6 +277,17 @@ def _measure(
         margin = each.margin(s) if is_barrier else 0.0
         found.append(measured - s.r_robot - margin)
     return np.reshape(found, (-1, len(points)))
+
+
+def _measure_bodies(scene: Any, x: Array) -> Array:
+    """Gaps to the bodies of people less `body_gap`, at the states `x` of a plan, shape (n, N+1) [m]."""
+    s, times = scene.settings, np.array(scene.settings.times)
+    found = [
+        np.hypot(*(x[:, :2] - _find_places(person, times, s, True)[0]).T)
+        for person in scene.people
+    ]
+    gaps = np.reshape(found, (-1, len(x)))
+    return np.asarray(gaps - BODY_RADIUS - s.r_robot - s.body_gap)
 
 
 def _find_places(

@@ -66,9 +66,10 @@ def test_the_plan_is_that_with_all_walls(
         assert a.inputs == pytest.approx(b.inputs, abs=1e-4)
         assert a.h.shape == b.h.shape == (91,) and a.residual.shape == b.residual.shape
         assert a.clearance.shape == b.clearance.shape
-        found = near._fixed.find_near(*near._near_from, near._near_reach)
-        left_out = ~np.isin(np.arange(91), [0, *(1 + i for i in found)])
-        assert 5 < left_out.sum() < 85 and near._near_fixed.size == 90 - left_out.sum()
+        kept = {tuple(ends) for ends in near._near.groups[0].numbers.tolist()}
+        ends = walls.reshape(-1, 4).tolist()
+        left_out = np.array([False, *(tuple(each) not in kept for each in ends)])
+        assert 5 < left_out.sum() < 85 and near._near.size == 90 - left_out.sum()
         assert a.h == pytest.approx(b.h)
         assert (b.residual[left_out] > 0).all()
         assert (b.h[left_out] > 1).all() and (b.clearance[left_out] > 1).all()
@@ -114,7 +115,7 @@ def test_a_robot_that_is_too_fast_sees_farther() -> None:
     for speed in (0.0, 1.0, 2.0):
         controller = szlib.MPCCBF(ZONE, walls=walls)
         controller.step((0.0, 0.0, speed, 0.0), (9.0, 0.0))
-        counts.append(controller._near_fixed.size)
+        counts.append(controller._near.size)
     assert counts[0] == counts[1] < counts[2]
 
 

@@ -315,7 +315,9 @@ def test_a_log_with_an_obstacle_of_an_unknown_kind_is_rejected(tmp_path):
     assert (type(back), back.numbers) == (type(edge), edge.numbers)
     file = tmp_path / "run.json"
     file.write_text(file.read_text().replace('"half-plane"', '"sofa"'))
-    with pytest.raises(szlib.DataError, match="no class of obstacles has the kind"):
+    with pytest.raises(
+        szlib.DataError, match="kind of an obstacle must be that of a class"
+    ):
         szlib.SimulationLog.load(tmp_path / "run")
 
 
