@@ -65,7 +65,7 @@ MOST_WAYS = 3
 # the edge of a map is so far from its points, at least and at most [m]
 _AROUND, _FARTHEST_WALL = 8.0, 35.0
 _FARTHEST = 10.0  # of a target on a route [m]
-_BLOCK = 16  # rows and columns of cells that are measured at once
+_CHUNK = 1_000_000  # cells that are measured at once
 # places of people who stand are rounded so, and a goal is the same if it moved less [m]
 _MOVED, _GOAL_MOVED = 0.3, 0.5
 _NEAR_WAY = 3  # cells that are near a way are at most so many steps from it
@@ -78,7 +78,6 @@ _MOVES = _MOVE_PRICE * np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
 _NAMED_WITHIN = 2.5  # people who are passed nearer than this are named [m]
 _ALONG = 0.4  # cosine of the angle from a walk within which one is in front or behind
 _DOOR = 1.0  # a place is narrow if no free disc of this radius holds it [m]
-_NAMED = 3  # largest number of parts of a name
 _WAITING = 0.8  # rest that is called waiting [s]
 # times at which people are looked at, and the time between two of them [s]
 _TIMES = np.linspace(0.0, 2 * SEARCH_TIME, 121)
@@ -166,21 +165,26 @@ class Map:
         self._link()
 
     def _cover(self, fixed: Obstacles) -> Mask:
-        """Where h < 0. In each block of cells the obstacles are measured whose box reaches into it."""
+        """Where h < 0. Each obstacle is measured in the cells of its box."""
         covered = np.zeros(self.shape, bool)
-        cells = np.moveaxis(np.indices(self.shape), 0, -1)
         for kind, numbers, given in fixed.groups:
             offsets = np.maximum(given, _MOST_SHARE * self.cell)
-            low, high = kind.bounds(numbers, offsets)
-            for i in range(0, self.shape[0], _BLOCK):
-                for j in range(0, self.shape[1], _BLOCK):
-                    block = slice(i, i + _BLOCK), slice(j, j + _BLOCK)
-                    centers = self.centers(cells[block])
-                    is_near = (low <= centers[-1, -1]) & (high >= centers[0, 0])
-                    rows = is_near.all(axis=1)
-                    x, y = centers[..., None].transpose(2, 0, 1, 3)
-                    d = kind.distance(x, y, 0.0, *numbers[rows].T)
-                    covered[block] |= (d < offsets[rows]).any(axis=-1)
+            first, last = (
+                np.column_stack(self.locate(corners))
+                for corners in kind.bounds(numbers, offsets)
+            )
+            sizes = last - first + 1
+            counts = sizes.prod(axis=1)
+            indices = np.arange(len(counts))
+            for rows in np.array_split(indices, 1 + counts.sum() // _CHUNK):
+                which, ends = np.repeat(rows, counts[rows]), counts[rows].cumsum()
+                place = np.arange(len(which)) - np.repeat(
+                    ends - counts[rows], counts[rows]
+                )
+                cells = first[which].T + np.divmod(place, sizes[which, 1])
+                x, y = self.centers(cells.T).T
+                unsafe = kind.distance(x, y, 0.0, *numbers[which].T) < offsets[which]
+                covered[*cells[:, unsafe]] = True
         return covered
 
     def _link(self) -> None:
@@ -204,8 +208,8 @@ class Map:
 
     def locate(self, points: Array) -> tuple[Cells, Cells]:
         """The cells of `points`, shape (..., 2), as two indices; beyond the map the nearest one."""
-        cells = ((points - self.corner) / self.cell).astype(int)
-        cells = cells.clip(0, np.subtract(self.shape, 1))
+        cells = (points - self.corner) / self.cell
+        cells = cells.clip(0, np.subtract(self.shape, 1)).astype(int)
         return cells[..., 0], cells[..., 1]
 
     def find_cell(self, point: ArrayLike, among: Mask | None = None) -> Cells:
@@ -522,7 +526,8 @@ def _name(m: Map, way: Way, near: Surroundings, turns: Array) -> str:
             behind = "waits for" if rest > _WAITING else "behind"
             side = "in front of" if ahead > 0 else behind
         found.append((_TIMES[k], f"{side} person {number}"))
-    words = ", ".join(word for _, word in sorted(found)[:_NAMED])
+    # at most three parts
+    words = ", ".join(word for _, word in sorted(found)[:3])
     is_straight = moved.sum() < 1.05 * dist(way.points[-1], way.points[0]) + m.cell
     return words or ("straight to the goal" if is_straight else "around walls")
 
