@@ -83,6 +83,9 @@ _WAITING = 0.8  # rest that is called waiting [s]
 _TIMES = np.linspace(0.0, 2 * SEARCH_TIME, 121)
 _TICK = float(_TIMES[1])
 
+# where free space is looked for, from a zone's centre to where the robot passes
+_BESIDE = np.linspace(0, 1, 20)
+
 
 class Way(NamedTuple):
     """A way to the goal.
@@ -604,8 +607,8 @@ def _turn_aside(
     w = asin(width / max(abs(center), width))
     bearing = phase(center.conjugate() * way)
     for side in (1, -1) if s.pass_side == "left" else (-1, 1):
-        passes = at + center + side * width * across
+        beside = at + center + side * width * across * _BESIDE
         lead = side * bearing / (s.head_on_share * w)
-        if -1 <= lead < 2 and (fixed.h(passes.real, passes.imag) >= 0).all():
+        if -1 <= lead < 2 and (fixed.h(beside.real, beside.imag) >= 0).all():
             return rect(1.0, (side * w - bearing) * min(1.0, 2 - lead))
     return 1.0
