@@ -223,39 +223,6 @@ def test_support_alone_has_the_same_ellipse(cloud):
     np.testing.assert_allclose(ellipse.level(alone.curve()), 1, atol=1e-6)
 
 
-def test_order_duplicates_and_inner_points_change_nothing():
-    rng = np.random.default_rng(4)
-    points = rng.normal(size=(50, 2))
-    ellipse = minimum_enclosing_ellipse(points)
-    inner = 0.99 * ellipse.curve(30) + 0.01 * np.array(ellipse.center)
-    again = minimum_enclosing_ellipse(
-        rng.permutation(np.vstack([points, points, inner]))
-    )
-    np.testing.assert_allclose(again.center, ellipse.center, atol=INSIDE)
-    np.testing.assert_allclose(again.semi_axes, ellipse.semi_axes, rtol=INSIDE)
-    assert again.angle == pytest.approx(ellipse.angle, abs=INSIDE)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_affine_maps_transform_the_ellipse(seed):
-    rng = np.random.default_rng([5, seed])
-    points, matrix, shift = (
-        rng.normal(size=(40, 2)),
-        rng.normal(size=(2, 2)),
-        rng.normal(size=2),
-    )
-    ellipse, mapped = (
-        minimum_enclosing_ellipse(points),
-        minimum_enclosing_ellipse(points @ matrix.T + shift),
-    )
-    assert mapped.area == pytest.approx(
-        ellipse.area * abs(np.linalg.det(matrix)), rel=AREA
-    )
-    np.testing.assert_allclose(
-        mapped.level(ellipse.curve() @ matrix.T + shift), 1, rtol=1e-9
-    )
-
-
 @pytest.mark.parametrize("truth", ELLIPSES)
 def test_an_ellipse_is_recovered_from_points_on_it(truth):
     ellipse = minimum_enclosing_ellipse(truth.curve(97))
@@ -346,18 +313,6 @@ def test_samples_alone_are_not_enough(name):
     sampled = minimum_enclosing_ellipse(curve(np.linspace(-np.pi, np.pi, 100)))
     assert np.max(sampled.level(curve(DENSE))) > 1 + 1e-6
     assert minimum_enclosing_ellipse_of_curve(curve, corners).area > sampled.area
-
-
-def test_a_polygon_has_the_ellipse_of_its_corners():
-    polygon = np.array([(1.0, 0.2), (0.1, 1.0), (-1.2, 0.3), (-0.6, -0.9), (0.8, -0.5)])
-    # 0 - R' is the polygon seen from the other side
-    mapped, corners = zone(polygon, r_max=0.0)
-    ellipse = minimum_enclosing_ellipse_of_curve(
-        lambda angles: -mapped(angles), corners
-    )
-    assert ellipse.area == pytest.approx(
-        minimum_enclosing_ellipse(polygon).area, rel=AREA
-    )
 
 
 @pytest.mark.parametrize(

@@ -112,14 +112,6 @@ def test_slice_exists_in_the_plane_of_many_vertices():
     assert Polygon(slice_hull(stack, 2.0, r_max=R_MAX).polygon).area == pytest.approx(4)
 
 
-def test_slices_of_the_vertices_are_slices_of_the_points():
-    points = cloud(5)
-    all_points, vertices = (
-        slice_hull(p, 1.0, r_max=R_MAX).polygon for p in (points, hull_vertices(points))
-    )
-    assert Polygon(all_points).symmetric_difference(Polygon(vertices)).area < 1e-12
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_polygons_are_convex_and_counter_clockwise(seed):
     corners = slice_hull(cloud(seed), 1.0, r_max=R_MAX).polygon
