@@ -56,7 +56,6 @@ SIDE_PRICE = 0.5
 """Price of passing people, who do not cross the way, on the side that is not `pass_side` [s] (assumed)."""
 GROUP_SECOND, GROUP_DISTANCE, GROUP_SPEED = 4.0, 1.5, 0.3
 """Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed).
-
 People of a group that is given are together up to twice this distance."""
 SWITCH_GAIN = 1.0
 """A way is kept until another one is this much cheaper [s] (assumed)."""
@@ -222,9 +221,9 @@ class Map:
         return np.asarray(places[((places - cell) ** 2).sum(axis=1).argmin()])
 
     def measure(self, start: Point, goal: Point, speed: float, price: Array) -> None:
-        """Measure the times to the `goal` at this `speed` [m/s], with the `price` of a second in each cell.
+        """Measure the times to the `goal`, or the nearest point that can be reached from the `start`.
 
-        If there is no way from the `start`, to the nearest point that can be reached.
+        Each cell has the `price` of a second; the robot drives at this `speed` [m/s].
         """
         self.price, self.blocked = price, ~self.free | (price >= BODY_SECOND)
         self.is_near = self._parts == self._parts[*self.find_cell(start)]
@@ -247,10 +246,7 @@ class Map:
         return self.centers(np.column_stack(np.unravel_index(found, self.shape)))
 
     def sees(self, start: Array, ends: Array) -> Mask:
-        """Whether straight lines from `start` to `ends`, shape (n, 2) [m], cross no `blocked` cell.
-
-        Those around the start do not count.
-        """
+        """Whether lines from `start` to `ends`, shape (n, 2) [m], cross no `blocked` cell (but close by)."""
         lines = ends - start
         n = 2 + int(2 * np.abs(lines).max(initial=0.0) / self.cell)
         offsets = np.linspace(0, 1, n)[:, None, None] * lines
@@ -372,10 +368,7 @@ class WayFinder:
             again += dt * REPEAT_SECOND * binary_dilation(used, iterations=_NEAR_WAY)
 
     def _head_for(self, m: Map, at: Point, points: Array) -> tuple[Heading, bool]:
-        """The target on the way through these `points`, the length of the way, and whether it is in sight.
-
-        It is the farthest one in sight, at most `lookahead` away, or a corner close by.
-        """
+        """The farthest of these `points` in sight, or a corner close by, and whether any is in sight."""
         p, farthest = np.array(at), min(self._s.lookahead, _FARTHEST)
         points = points[int(np.hypot(*(points - p).T).argmin()) :]
         lengths = _time(np.vstack([p, points]), 1.0)[1:]
@@ -388,10 +381,7 @@ class WayFinder:
 
 
 def _find_turns(way: Way, around: Array, since: float = 0.0) -> Array:
-    """Angles by which a `way` turns around places `around` it at `_TIMES`, shape (n,) [rad].
-
-    The robot is on the way `since` so long [s].
-    """
+    """Angles by which a `way`, `since` a time [s] on, turns around places `around` it, shape (n,) [rad]."""
     offset = way.at(since + _TIMES) - around
     turns = np.diff(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)
     return np.asarray(((turns + pi) % (2 * pi) - pi).sum(axis=1))
@@ -453,8 +443,7 @@ class Surroundings:
     ) -> Array:
         """Prices of the `places` of these `rows`, at each of these `times`, shape (times, nx, ny).
 
-        The first cell is `low`, and there are so many as `shape` says. Where people overlap, the higher price
-        counts.
+        The first cell is `low`, as many as `shape`. The higher price counts where people overlap.
         """
         n, stamps = self._prices.shape[1], self._prices[rows]
         prices = np.zeros((len(times), *(size + 2 * n for size in shape)), np.float32)
@@ -484,8 +473,7 @@ def _find_pairs(people: Array, groups: Sequence[Hashable]) -> Cells:
 def cross_layers(costs: Any, begin: Any, far: Array) -> Array:
     """Cells of the cheapest way through layers of `costs`, one in each, shape (k + 1, 2).
 
-    It begins in the cell `begin`, and ends in the last layer, or in any at the edge or at the goal: where its
-    cost and `far` are least together.
+    From `begin` to the last layer, or to the edge or the goal, where cost and `far` are least together.
     """
     layers = np.full((len(costs) + 1, *far.shape), inf, np.float32)
     layers[0, *begin] = 0.0
@@ -529,7 +517,6 @@ def _name(m: Map, way: Way, near: Surroundings, turns: Array) -> str:
             behind = "waits for" if rest > _WAITING else "behind"
             side = "in front of" if ahead > 0 else behind
         found.append((_TIMES[k], f"{side} person {number}"))
-    # at most three parts
     words = ", ".join(word for _, word in sorted(found)[:3])
     is_straight = moved.sum() < 1.05 * dist(way.points[-1], way.points[0]) + m.cell
     return words or ("straight to the goal" if is_straight else "around walls")
