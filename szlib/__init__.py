@@ -15,9 +15,7 @@ def __getattr__(name: str) -> object:
     try:
         return _load(name)
     except ModuleNotFoundError as error:
-        if (error.name or "szlib").startswith("szlib"):
-            raise
-        advice = "pip install 'szlib[data]' reads tracks and fits zones, 'szlib[workbook]' draws"
-        raise ModuleNotFoundError(
-            f"szlib.{name} needs {error.name}: {advice}", name=error.name
-        ) from error
+        error.add_note(
+            "pip install 'szlib[data]' reads tracks and fits zones, 'szlib[workbook]' draws"
+        )
+        raise

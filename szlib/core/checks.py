@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,6 @@ Array = NDArray[np.float64]  # an array of floats
 # Largest coordinate, speed or parameter that is accepted [m, m/s, ...]. Floats are spaced 1.5e-8 there,
 # well below the tolerance of the controller. Every map projection of the Earth stays below it.
 LARGEST = 1e8
-_DOUBLE = np.dtype(float)
 
 
 def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:
@@ -70,32 +69,26 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
         array = np.asarray(value)
     expected = f"numbers of shape {shape}".replace("Ellipsis", "...")
     require(array.dtype.kind in "iuf", name, value, expected, SolverError)
-    fits = array.shape == shape
-    if ... in shape:
-        fits = array.shape[max(0, array.ndim - len(shape) + 1) :] == shape[1:]
-    if not fits:
+    sizes = shape[1:] if ... in shape else shape
+    n_free = array.ndim - len(sizes)
+    if array.shape[n_free:] != sizes or (n_free and sizes == shape):
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)
-    require(np.isfinite(array).all(), name, array.tolist(), "finite", SolverError)
-    if np.abs(array).max(initial=0.0) > LARGEST:
-        raise SolverError(
-            f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin"
-        )
+    within = f"finite and within +-{LARGEST:g}, or the origin moved"
+    is_within = np.abs(array).max(initial=0.0) <= LARGEST
+    require(is_within, name, array.tolist(), within, SolverError)
     return array
 
 
 def check_vector(name: str, value: ArrayLike, n: int) -> list[float]:
     """The `n` numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
     numbers: Any = value
-    if type(numbers) is np.ndarray and numbers.dtype is _DOUBLE:
+    if type(numbers) is np.ndarray:
         numbers = numbers.tolist()
-    if isinstance(numbers, tuple | list) and len(numbers) == n:
-        for each in numbers:  # all() takes three times as long
-            if type(each) is not float or not -LARGEST <= each <= LARGEST:
-                break
-        else:
-            return list(numbers)
-    return cast(list[float], check_array(name, value, (n,)).tolist())
+    is_row = isinstance(numbers, tuple | list) and len(numbers) == n
+    if is_row and all(type(v) is float and abs(v) <= LARGEST for v in numbers):
+        return list(numbers)
+    return list(map(float, check_array(name, value, (n,))))
 
 
 def check_point(name: str, value: ArrayLike) -> tuple[float, float]:

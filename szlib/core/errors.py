@@ -51,13 +51,13 @@ class MemoryLimitError(DataError):
 
     Examples
     --------
-    >>> from szlib.core.input_files import granted_memory, require_memory
+    >>> from szlib.core.input_files import environment, require_memory
     >>> try:
-    ...     with granted_memory(10**9):
+    ...     with environment(SZLIB_MEMORY="1GB"):
     ...         require_memory(5e9, "the table")
     ... except szlib.MemoryLimitError as error:
     ...     print(error)
-    the table takes about 5.0 GB of memory, and the limit is 1.0 GB; ...
+    the table takes about 5 GB of memory, and the limit is 1 GB; ...
     """
 
 

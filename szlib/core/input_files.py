@@ -7,21 +7,12 @@ memory that is available.
 
 from __future__ import annotations
 
-import errno
 import hashlib
-import json
 import os
 import re
 import stat
-import time
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import (
-    AbstractContextManager,
-    ExitStack,
-    contextmanager,
-    suppress,
-)
-from contextvars import ContextVar
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -30,18 +21,14 @@ import psutil
 
 from .errors import DataError, MemoryLimitError, SzlibError
 
-_TICK = 0.004  # two changes of a file within this time [s] can have the same time stamp (Linux)
 # Zero-width letters of Persian, Hindi and emoji, which Python calls not printable.
 _JOINERS = "\u200c\u200d"
 # what differs after a file has changed
 _STATE = attrgetter("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
-# The files that `unchanged_files` keeps open, by path.
-_OPEN_FILES: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
 
 # Environment variable: the limit of each process, such as 4GB; ``--memory`` of the command line sets it.
 MEMORY_VARIABLE = "SZLIB_MEMORY"
 _SHARE = 0.8  # share of the available memory that may be used
-_GRANTED_SIZE: ContextVar[int | None] = ContextVar("granted", default=None)
 
 
 def require(
@@ -106,13 +93,9 @@ def reading(
 
 def open_regular(path: Path) -> BinaryIO:
     """Open the regular file `path` to read it; OSError for anything else, such as a FIFO without end."""
-    # do not wait for a process that writes the file
-    at_once = getattr(os, "O_NONBLOCK", 0)
-    stream = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))  # noqa: SIM115
-    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-        return stream
-    stream.close()
-    raise OSError(errno.EINVAL, "it is no regular file", str(path))
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise OSError("it is no regular file")
+    return path.open("rb")
 
 
 def read_small(path: Path, largest: int = 10_000_000) -> bytes:
@@ -120,80 +103,45 @@ def read_small(path: Path, largest: int = 10_000_000) -> bytes:
     with open_regular(path) as stream:
         content = stream.read(largest + 1)
     if len(content) > largest:
-        raise OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB", str(path))
+        raise OSError(f"it is larger than {largest / 1e6:g} MB")
     return content
-
-
-def read_json_object(path: Path) -> dict[str, Any]:
-    """The object in the small JSON file `path`; empty if the file is missing or damaged."""
-    with suppress(OSError, ValueError, TypeError, RecursionError):
-        return dict(json.loads(read_small(path)))
-    return {}
 
 
 @contextmanager
 def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
-    """Keep the files `paths` open while the block reads them at their `readable_path`.
-
-    Each is opened once, so that checksums and rows are of the same bytes.  A block inside this one uses
-    the same open files.  Raises DataError where a file cannot be opened, or has changed when the block ends.
-    """
-    with ExitStack() as stack:
-        opened = {}
-        for path in set(paths) - _OPEN_FILES.get({}).keys():
-            what = f"{printable(path)}: cannot be opened"
-            with explain_errors(
-                what, "expected a file that may be read", faults=OSError
-            ):
-                opened[path] = stack.enter_context(open_regular(path))
-        before = {path: _states(path, stream) for path, stream in opened.items()}
-        token = _OPEN_FILES.set({**_OPEN_FILES.get({}), **opened})
-        try:
-            yield
-        finally:
-            _OPEN_FILES.reset(token)
-            for path, stream in opened.items():
-                if _states(path, stream) != before[path]:
-                    raise DataError(
-                        f"{printable(path)}: changed while it was read; try again when it is complete"
-                    )
+    """Raise DataError where one of the files `paths` has changed when the block ends, or cannot be found."""
+    before = {path: _find_state(path) for path in paths}
+    yield
+    for path, state in before.items():
+        if _find_state(path) != state:
+            raise DataError(
+                f"{printable(path)}: changed while it was read; try again when it is complete"
+            )
 
 
-def readable_path(path: Path) -> Path:
-    """The path at which `unchanged_files` keeps file `path` open, whatever has replaced it; else `path`.
-
-    Systems without /proc have no such path. There `unchanged_files` finds a file that was replaced, but not a
-    folder that was exchanged for another one and put back while its files were read.
-    """
-    stream = _OPEN_FILES.get({}).get(path)
-    place = Path(f"/proc/self/fd/{stream.fileno()}") if stream else path
-    return place if place.exists() else path
+def _find_state(path: Path) -> Any:
+    """Device, inode, size and times of the file `path`."""
+    with opening(path):
+        return _STATE(path.stat())
 
 
-def _states(path: Path, stream: BinaryIO) -> list[tuple[float, ...]]:
-    """Device, inode, size and times of the file that is open and of the file at its path, if there is one."""
-    if abs(time.time() - os.fstat(stream.fileno()).st_ctime) < _TICK:
-        time.sleep(_TICK)  # a change after this has another time
-    found = [os.fstat(stream.fileno())]
-    with suppress(OSError):
-        found.append(path.stat())
-    return list(map(_STATE, found))
+def opening(path: Path) -> AbstractContextManager[None]:
+    """Raise DataError if the block cannot open the file `path`."""
+    shown = f"{printable(path)}: cannot be opened"
+    return explain_errors(shown, "expected a file that may be read", faults=OSError)
 
 
 def file_content(file: Path) -> tuple[int, str]:
-    """Size of `file` [bytes] and its SHA-256; raises DataError as `unchanged_files`."""
-    with unchanged_files([file]), readable_path(file).open("rb") as stream:
+    """Size of `file` [bytes] and its SHA-256; raises DataError where it cannot be read."""
+    with opening(file), file.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
         return stream.tell(), digest
 
 
 def printable(name: object) -> str:
     """The file name `name` as text for any file and any terminal: bytes that are not UTF-8 are escaped."""
-    text = (
-        str(name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-    )
     return "".join(
-        c if c.isprintable() or c in _JOINERS else ascii(c)[1:-1] for c in text
+        c if c.isprintable() or c in _JOINERS else ascii(c)[1:-1] for c in str(name)
     )
 
 
@@ -201,55 +149,47 @@ def printable(name: object) -> str:
 
 
 def parse_size(text: str) -> int:
-    """Bytes of `text`, such as "4GB", "512 MiB" or "2g"; raises MemoryLimitError for other text."""
-    found = re.fullmatch(
-        r"(\d{1,15}(?:\.\d{1,9})?) ?([KMGT]?)(I?)B?", text.strip().upper(), re.ASCII
-    )
-    number, prefix, binary = found.groups() if found else ("0", "", "")
-    size = float(number) * (1024 if binary else 1000) ** " KMGT".index(prefix or " ")
-    if not 1 <= size < 1e18:
+    """Bytes of `text`, such as "4GB", "512 MB" or "2g"; raises MemoryLimitError for other text."""
+    pattern = r"([1-9]\d{0,14}\.?\d{0,9}) ?([KMGT]?)B?"
+    found = re.fullmatch(pattern, text.strip().upper(), re.ASCII)
+    if found is None:
         raise MemoryLimitError(
             f"memory {text!r}: expected an amount such as 4GB or 512MB"
         )
-    return int(size)
+    return int(float(found[1]) * 1000 ** " KMGT".index(found[2] or " "))
 
 
 def memory_limit() -> int:
     """Bytes that this process may use in total."""
     text = os.environ.get(MEMORY_VARIABLE)
-    return _GRANTED_SIZE.get() or (parse_size(text) if text else _available_memory())
+    return parse_size(text) if text else _available_memory()
 
 
 @contextmanager
-def granted_memory(size: int | None) -> Iterator[None]:
-    """Set the limit to `size` bytes inside a with block; None changes nothing."""
-    token = _GRANTED_SIZE.set(size or _GRANTED_SIZE.get())
+def environment(**variables: str) -> Iterator[None]:
+    """Set environment variables inside a with block."""
+    before = os.environ.copy()
+    os.environ.update(variables)
     try:
         yield
     finally:
-        _GRANTED_SIZE.reset(token)
+        os.environ.clear()
+        os.environ.update(before)
 
 
 def require_memory(size: float, what: str) -> None:
     """Raise MemoryLimitError if `size` bytes are above the limit; `what` takes them, as the message says."""
-    if size > (allowed := memory_limit()):
+    allowed = memory_limit()
+    if size > allowed:
         raise MemoryLimitError(
-            f"{what} takes about {_show_size(size)} of memory, and the limit is {_show_size(allowed)}; split "
-            f"the data by time, or raise the limit (--memory, ${MEMORY_VARIABLE}) if the machine has more"
+            f"{what} takes about {size / 1e9:.3g} GB of memory, and the limit is {allowed / 1e9:.3g} GB; "
+            f"split the data by time, or raise the limit (--memory, ${MEMORY_VARIABLE})"
         )
 
 
-def _show_size(size: float) -> str:
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
-
-
 def _available_memory() -> int:
-    """Four fifths of the bytes free without swapping, or of those left to a Linux container (cgroup 2)."""
-    available, group = psutil.virtual_memory().available, "/sys/fs/cgroup/memory"
+    """Four fifths of the bytes free without swapping, or of those that a Linux container has (cgroup 2)."""
+    available = psutil.virtual_memory().available
     with suppress(OSError, ValueError):  # "max": no limit
-        allowed = float(Path(f"{group}.max").read_text())
-        used = float(Path(f"{group}.current").read_text())
-        statistics = Path(f"{group}.stat").read_text()
-        cached = re.findall(r"^inactive_file (\d+)", statistics, re.M)
-        available = min(available, allowed - used + float(cached[0]))
+        available = min(available, int(Path("/sys/fs/cgroup/memory.max").read_text()))
     return int(_SHARE * available)

@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from contextvars import copy_context
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -317,7 +316,7 @@ def extract_days(
     Raises
     ------
     DataError : there is no such file or parameter.
-    StorageError : the folder cannot be made, holds files that szlib did not write, or holds the input.
+    StorageError : the folder cannot be made, or holds files that szlib did not write.
 
     Examples
     --------
@@ -333,7 +332,7 @@ def extract_days(
     excluded = {exclude} if isinstance(exclude, str) else set(map(str, exclude))
     files = sorted({file.resolve() for file in datasets.find(paths)})
     recipe = find_recipe(files, recipe, **of_recipe)
-    folder = claim_folder(out, PURPOSE, inputs=files)
+    folder = claim_folder(out, PURPOSE)
     days: dict[str, list[Path]] = {}
     for file, name in zip(files, name_recordings(files), strict=True):
         days.setdefault(find_day(file, recipe) or printable(name), []).append(file)
@@ -390,9 +389,7 @@ def extract_day(
     try:
         # Checksums are computed while the files are read.
         with unchanged_files(files), ThreadPoolExecutor(1) as thread:
-            described = thread.submit(
-                copy_context().run, describe_source, files, settings, recipe
-            )
+            described = thread.submit(describe_source, files, settings, recipe)
             samples = None
             status = "kept"
             if (out / f"{day}.parquet").is_file():

@@ -12,11 +12,11 @@ datasets      named data and paths, downloads verified by hash
 """
 
 from . import datasets, funnels
-from .clock import check_tracks, clock_index, read_tracks, to_clock, to_pedpy
+from .clock import clock_index, read_tracks, to_clock
 from .readers import read_raw
 from .recipe import Recipe
 
 __all__ = [
-    "Recipe", "check_tracks", "clock_index", "datasets", "funnels", "read_raw",
-    "read_tracks", "to_clock", "to_pedpy",
+    "Recipe", "clock_index", "datasets", "funnels", "read_raw",
+    "read_tracks", "to_clock",
 ]  # fmt: skip

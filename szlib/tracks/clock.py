@@ -12,14 +12,13 @@ It is sorted by day, id, t, without duplicates.  Where two successive ticks of a
 one step of the clock, the person was not seen in between; positions are not interpolated across such a gap.
 
 A loader for a new data set is a function that returns such a table: it collects day, id, t [s], x, y [m] in
-any order and at any rate, counts rejected rows with `funnels.stage`, and calls `to_clock`.  `check_tracks`
-checks it.
+any order and at any rate, counts rejected rows with `funnels.stage`, and calls `to_clock`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,9 +29,6 @@ from ..core.input_files import require, require_memory
 from . import funnels
 from .readers import list_sources, read_raw
 from .recipe import SHORTEST_GAP, Recipe, find_recipe
-
-if TYPE_CHECKING:
-    from pedpy import TrajectoryData
 
 TICKS_PER_SECOND = 10  # the common clock: positions at multiples of 0.1 s
 
@@ -52,9 +48,6 @@ _MOST_LOST, _FEW = 0.5, 20
 
 _BYTES_PER_TICK = 200  # memory of a tick while a table is brought to the clock [bytes] (measured: 188)
 
-# greatest difference between velocities and those from positions [m/s]
-_TOLERANCE = 1e-6
-
 COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
 
 
@@ -70,9 +63,9 @@ def read_tracks(
     Parameters
     ----------
     paths : a file, or several, plain or .gz: a table as text, Parquet, Feather or SQLite; ATC raw, ATC 1 Hz,
-        EWAP obsmat, UCY's vsp, TrajNet++, THOR-MAGNI, Pathfinder's JSON; by PedPy's loaders texts and HDF5 of
+        EWAP obsmat, TrajNet++, THOR-MAGNI; by PedPy's loaders texts and HDF5 of
         Juelich's archive, Viswalk, Vadere, JuPedSim (extra `pedpy`).  Or tables: of pandas, Polars, Arrow,
-        GeoPandas, MovingPandas, PedPy's TrajectoryData.
+        PedPy's TrajectoryData.
     recipe : how files are read; None takes the `reading.json` beside the first file, or finds one.
     exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
     parameters : single values of `szlib.Recipe` in place of those of `recipe`, such as unit, frame_rate or
@@ -169,36 +162,31 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
 def _on_clock(
     t: np.ndarray, xy: np.ndarray, within: np.ndarray
 ) -> tuple[np.ndarray, list[np.ndarray], int]:
-    """The ticks of all pieces: the row before each; t, x, y, vx, vy; how many rows have a tick.
+    """The ticks of all pieces: a row of the piece; t, x, y, vx, vy; how many rows have a tick.
 
     `within` says of each row but the first whether it continues a piece.
     """
     begin = np.flatnonzero(np.r_[True, ~within])
     size = np.diff(begin, append=len(t))
-    end = begin + size - 1
-    next_tick = np.ceil((t - _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
-    last = np.floor((t[end] + _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
-    first = next_tick[begin]
+    first_t, last_t = t[begin], t[begin + size - 1]
+    first = np.ceil((first_t - _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
+    last = np.floor((last_t + _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
     count = np.maximum(last - first + 1, 0)
     start = np.cumsum(count) - count
     piece = np.repeat(np.arange(len(begin)), count)
     at = np.arange(len(piece))
-    tick = at - np.repeat(start - first, count)
-    # position of the first tick after each row
-    slot = next_tick - np.repeat(first - start, size)
-    row = np.repeat(np.arange(len(t)), np.diff(slot, append=len(piece)))
-    row = np.minimum(row, np.maximum(end - 1, begin)[piece])
-    after = np.minimum(row + 1, end[piece])
-    moment = tick / TICKS_PER_SECOND
-    step = np.where(after > row, t[after] - t[row], 1.0)
-    weight = np.clip((moment - t[row]) / step, 0.0, 1.0)
-    x, y = (each[row] + weight * (each[after] - each[row]) for each in xy)
+    moment = (at + (first - start)[piece]) / TICKS_PER_SECOND
+    # One time for all pieces, in which they follow each other, a second apart.
+    shift = np.cumsum(last_t - first_t + 1) - last_t
+    own = t + np.repeat(shift, size)
+    when = np.clip(moment, first_t[piece], last_t[piece]) + shift[piece]
+    x, y = (np.interp(when, own, each) for each in xy)
     reach = round(VELOCITY_SPAN * TICKS_PER_SECOND)
     low = np.maximum(at - reach, start[piece])
     high = np.minimum(at + reach, (start + count - 1)[piece])
     duration = np.where(high > low, (high - low) / TICKS_PER_SECOND, np.nan)
     vx, vy = ((each[high] - each[low]) / duration for each in (x, y))
-    return row, [moment, x, y, vx, vy], int(size[count > 0].sum())
+    return begin[piece], [moment, x, y, vx, vy], int(size[count > 0].sum())
 
 
 def compute_velocities(tracks: pd.DataFrame) -> np.ndarray:
@@ -289,80 +277,3 @@ def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
             "without a type count as seconds: divide milliseconds by 1000; if they are seconds, pass max_gap"
         )
     return max_gap
-
-
-# --- other programs -----------------------------------------------------------------------------------
-
-
-def check_tracks(tracks: pd.DataFrame) -> None:
-    """Check that a table is a track table.
-
-    Parameters
-    ----------
-    tracks : the table.
-
-    Raises
-    ------
-    DataError : says what is wrong, and where.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> from szlib.tracks import check_tracks, to_clock
-    >>> raw = pd.DataFrame({"day": "any", "id": 1, "t": [0.0, 0.4], "x": [0.0, 0.5], "y": 0.0})
-    >>> check_tracks(to_clock(raw))
-    >>> check_tracks(to_clock(raw).iloc[::-1])
-    Traceback (most recent call last):
-    ...
-    szlib.core.errors.DataError: row 4: got {...}; this row is out of order; ...
-    """
-    order = clock_index(tracks)[0]
-    expected = "this row is out of order; expected rows sorted by day, id, t"
-    check_rows(tracks, order == np.arange(len(order)), ["day", "id", "t"], expected)
-    if list(tracks.columns[: len(COLUMNS)]) != COLUMNS:
-        raise DataError(
-            f"columns are {list(tracks.columns)}; expected {COLUMNS} first, in this order"
-        )
-    if not pd.api.types.is_integer_dtype(tracks["id"]):
-        raise DataError(f"id is {tracks['id'].dtype}; expected whole numbers")
-    right, given = compute_velocities(tracks), tracks[["vx", "vy"]].to_numpy(float)
-    is_near = np.isclose(given, right, rtol=0, atol=_TOLERANCE, equal_nan=True)
-    advice = "let szlib.tracks.clock.to_clock compute velocities from positions, and never bridge a gap"
-    expected = f"expected velocities over +-0.5 s; {advice}"
-    check_rows(tracks, is_near.all(axis=1), ["day", "id", "t", "vx", "vy"], expected)
-    stages = funnels.get(tracks)
-    if not stages:
-        raise DataError(
-            'the table has no funnel; expected its stages in .attrs["funnel"]'
-        )
-    for stage in stages:
-        funnels.stage(*stage.values())
-
-
-def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:
-    """Convert the track table `tracks` of one day to PedPy's TrajectoryData, at 10 frames/s.
-
-    The frame is t in ticks of 0.1 s.  `szlib.read_tracks` converts back.  Needs the extra `pedpy`.  Raises
-    DataError for a table of several days, which PedPy does not distinguish.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> from szlib.tracks import to_clock, to_pedpy
-    >>> raw = pd.DataFrame({"day": "any", "id": 1, "t": [0.0, 0.4], "x": [0.0, 0.5], "y": 0.0})
-    >>> to_pedpy(to_clock(raw)).frame_rate  # doctest: +SKIP
-    10.0
-    """
-    from pedpy import TrajectoryData
-
-    clock_index(tracks)
-    days = tracks["day"].unique()
-    if len(days) > 1:
-        raise DataError(
-            f"PedPy has no days, and the table has {len(days)}: {list(days)[:5]}; pass one of them"
-        )
-    frame = nearest_tick(tracks["t"].to_numpy(float))
-    data = tracks[["id", "x", "y"]].assign(frame=frame).reset_index(drop=True)
-    return TrajectoryData(
-        data=data[["id", "frame", "x", "y"]], frame_rate=float(TICKS_PER_SECOND)
-    )

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +22,7 @@ from polars import Float64, Int64, Series, String, col, exceptions
 
 from ..core.errors import DataError
 from ..core.input_files import explain_errors
-from .plausibility import suggest_columns
+from .funnels import first_rows, measure_motion, rejection_reason
 from .recipe import DEGREES, NAMES, PIXELS, SHAPES, TIME_UNITS, Recipe, advise
 from .shapes import open_arrow, open_database, open_json, open_shape
 from .sources import CONTAINERS, File, Rows, Source, recognise
@@ -32,8 +34,8 @@ _MIN_ROWS = 5
 _FRAMES = 25.0  # a usual frame rate [1/s], for advice
 _MAX_COLUMNS = 40  # number of columns that are looked at
 _PIXEL = 0.02  # metres in a pixel that an error message shows as an example
-_MAX_TRIALS = 8  # number of columns that are tried, with those that are given
 _SAMPLE = 2000  # rows in which columns are guessed
+_MOST = 0.95  # share of them that another reading must be able to use
 
 # Times without a unit whose median is larger count in this unit since 1970: as seconds they would be
 # later than the year 5000.
@@ -91,7 +93,7 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
     a column that may tell recordings apart is such an error, too.
     """
     named, path, decimal = recipe.has_people, source.where, source.decimal
-    recipe = find_columns(source, recipe)
+    recipe = find_columns(source, recipe, ask=ask)
     values = {name: column_of(source, at) for name, at in recipe.columns.items()}
     numbers = {
         name: to_numbers(column, decimal)
@@ -151,8 +153,10 @@ def metres_in_degree(latitude: float) -> tuple[float, float]:
 # --- which column holds what --------------------------------------------------------------------------
 
 
-def find_columns(source: Source, recipe: Recipe) -> Recipe:
+def find_columns(source: Source, recipe: Recipe, *, ask: bool = True) -> Recipe:
     """Complete a `recipe` with the columns of a `source`, and with the units that their names state.
+
+    With `ask` an error proposes columns.
 
     Raises
     ------
@@ -175,9 +179,11 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
     if missing := [name for name in needed if not at[name]]:
         known = ", ".join(repr(name or k) for k, name in enumerate(names[:12]))
         columns = found | dict.fromkeys(missing, "...")
-        advice = suggest_reading(source, replace(recipe, columns=found))
+        lacking = ", ".join(str(given.get(name, name)) for name in missing)
+        part = replace(recipe, columns=found)
+        advice = suggest_reading(source, part) if ask else ""
         advice = advice or f"it has {known}; {advise(columns=columns)}"
-        raise DataError(f"{where} has no column {', '.join(missing)}; {advice}")
+        raise DataError(f"{where} has no column {lacking}; {advice}")
     stated = {q: _split_unit(name)[1] for q, name in found.items() if name in names}
     units = {NAMES["units"].get(stated.get(name)) for name in "xy"}
     unit = units.pop() if len(units) == 1 else None
@@ -291,31 +297,61 @@ def _candidates(quantity: str, recipe: Recipe, names: Sequence[str]) -> list[str
 
 
 def suggest_reading(source: Source | None, recipe: Recipe) -> str:
-    """Advice how to read a `source` so that people walk; empty where no columns do it.
+    """Advice how to read a `source` so that people walk: the first of the usual readings with which they do.
 
-    Columns that the `recipe` names are taken as they are.  Constant columns are left out of the search.
+    Columns that the `recipe` names are taken as they are; at last the first ones that vary are tried in any
+    order.  Empty where people walk with none.
     """
     if source is None:
         return ""
-    time, columns = recipe.columns.get("t"), dict[str | int, np.ndarray]()
-    quantities = [
-        name for name in ("t", "frame", "id", "x", "y") if name in recipe.columns
+    sample = replace(
+        source, column=lambda k: source.column(k).head(_SAMPLE), ragged=False
+    )
+    usual = [(recipe.columns, change) for change in NAMES["readings"]]
+    for known, change in [*usual, ({}, {})]:
+        is_frame = "frame" in recipe.columns or "frame_rate" in change
+        time = known.get("frame", known.get("t"))
+        columns = {
+            "frame" if is_frame else "t": time,
+            **{name: known.get(name) for name in ("id", "x", "y")},
+        }
+        found = _find_walking(sample, recipe, columns, change)
+        new = {name: v for name, v in change.items() if getattr(recipe, name) is None}
+        if not found.items() <= recipe.columns.items():
+            new = {"columns": found, **new}
+        if found and new:
+            rate = f"{_FRAMES:g} frames a second are only a guess: "
+            guess = rate if "frame_rate" in new else ""
+            return f"people walk if it is read like this: {guess}{advise(**new)}"
+    return ""
+
+
+def _find_walking(
+    source: Source, recipe: Recipe, known: Mapping[str, Any], change: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The `known` columns, completed by others that vary, with which people walk; empty where there are none.
+
+    Of several orders, the one with the smoothest ways is taken, then the one with the most regular times.
+    """
+    missing = [name for name, at in known.items() if at is None]
+    free = [
+        name or k
+        for k, name in enumerate(source.names[:_MAX_COLUMNS])
+        if (name or k) not in known.values() and source.column(k).n_unique() > 1
     ]
-    given = [recipe.columns[name] for name in quantities]
-    names = [name or k for k, name in enumerate(source.names[:_MAX_COLUMNS])]
-    for at in dict.fromkeys([*given, *(names if len(given) < 4 else [])]):
-        values = column_of(source, at).head(_SAMPLE)
-        unit = recipe.time_unit if at == time else None
-        found = [to_times(values, "UTC", unit, decimal)[0] for decimal in ".,"]
-        usual = min(found, key=Series.null_count)
-        if 2 * usual.null_count() > len(values):  # each text gets a number
-            usual = to_ids(values, source.where).cast(Float64)
-        numbers = usual.fill_null(np.nan).to_numpy()
-        usable = numbers[np.isfinite(numbers)]
-        is_varied = 2 * len(usable) > len(numbers) and np.ptp(usable) > 0
-        if at in given or (is_varied and len(columns) < _MAX_TRIALS):
-            columns[at] = numbers
-    return suggest_columns(columns, recipe)
+    found: list[Any] = []
+    for order in permutations(free[: len(missing)], len(missing)):
+        columns = {**known, **dict(zip(missing, order, strict=True))}
+        given = replace(recipe, columns=columns).over(Recipe(**change))
+        with suppress(DataError, exceptions.PolarsError):
+            table = load_rows(source, given, ask=False).table
+            good = table.filter(rejection_reason(table).is_null()).collect()
+            motion = measure_motion(first_rows(good))
+            is_most = good.height > _MOST * len(source.column(0))
+            if is_most and motion and motion.is_walking:
+                scores = round(motion.roughness, 1), round(motion.irregularity, 3)
+                found.append((*scores, len(found), columns))
+    return min(found)[-1] if found else {}
 
 
 # --- values -------------------------------------------------------------------------------------------
@@ -357,7 +393,7 @@ def to_times(
         return values.dt.total_nanoseconds() / 1e9, None
     if values.dtype.is_temporal() and values.dtype != pl.Time:
         zone = getattr(values.dtype, "time_zone", None)
-        moments = values.cast(pl.Datetime("ns", zone))
+        moments = values.cast(pl.Datetime("ns", zone), strict=False)
         if zone is None:
             moments = moments.dt.replace_time_zone(
                 tz, ambiguous="null", non_existent="null"

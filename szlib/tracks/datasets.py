@@ -10,7 +10,6 @@ spaces using 3-D range sensors", IEEE Trans. Human-Machine Systems 43(6), 2013.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import tomllib
@@ -20,7 +19,7 @@ from pathlib import Path
 
 import pooch
 
-from ..core.errors import DataError, warn
+from ..core.errors import DataError
 from ..core.input_files import explain_errors, printable
 
 SYNTHETIC = "synthetic"
@@ -28,15 +27,6 @@ SYNTHETIC = "synthetic"
 DATA_DIR_VARIABLE = "SZLIB_DATA_DIR"
 
 _LONGEST_LABEL = 60
-_BLOB_ID = 40  # digits of a blob id of git; SHA-256 has more
-_ATTEMPTS = 3  # number of times that a file with a wrong hash is fetched
-
-
-def git_blob_id(file: str | Path) -> str:
-    """The name that git gives to the content of `file`: SHA-1 of "blob", size, a zero byte, content."""
-    content = Path(file).read_bytes()
-    head = f"blob {len(content)}\0".encode()
-    return hashlib.sha1(head + content, usedforsecurity=False).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -45,19 +35,12 @@ class DataSet:
 
     Attributes
     ----------
-    url : folder of the files.
-    hashes : hash of the content of each file, by its name: SHA-256, or the shorter `git_blob_id`.
+    url : folder of the files, pinned to a commit.
+    hashes : SHA-256 of the content of each file, by its name; empty where it is not known.
     """
 
     url: str
     hashes: dict[str, str]
-
-    def find_fault(self, file: Path) -> str:
-        """What is wrong with the content of a `file` of this name; empty if nothing is."""
-        expected = self.hashes[file.name]
-        hash_file = git_blob_id if len(expected) == _BLOB_ID else pooch.file_hash
-        found = hash_file(str(file))
-        return "" if found == expected else f"its hash is {found}, expected {expected}"
 
 
 _ENTRIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
@@ -123,62 +106,31 @@ def label(data: str | Path | Sequence[str | Path]) -> str:
 
 def _find_named(name: str) -> list[Path]:
     """The files of a named data set, each with the right hash."""
-    data = DATA_SETS[name]
-    if folder := os.environ.get(DATA_DIR_VARIABLE):
-        files = [Path(folder) / name / file for file in data.hashes]
-        for file in files:
-            if not file.is_file():
-                raise DataError(
-                    f"{file}: no such file; ${DATA_DIR_VARIABLE} must name a folder with {name}/ in it"
-                )
-            if fault := data.find_fault(file):
-                raise DataError(f"{file}: {fault}; it is damaged or of another version")
-        return files
+    data, folder = DATA_SETS[name], os.environ.get(DATA_DIR_VARIABLE)
     store = pooch.create(
-        path=pooch.os_cache("szlib") / name,
+        path=Path(folder or pooch.os_cache("szlib")) / name,
         base_url=data.url,
-        registry=dict.fromkeys(data.hashes),
+        registry={file: digest or None for file, digest in data.hashes.items()},
         retry_if_failed=2,
+        allow_updates=not folder,
     )
-    try:
-        return [_fetch(store, file, data) for file in data.hashes]
-    except OSError as error:  # requests' errors are OSErrors
-        raise DataError(
-            f"{name} could not be downloaded from {data.url} ({error}); go online, or put its files into a "
-            f"folder {name}/ and name its parent in ${DATA_DIR_VARIABLE}"
-        ) from error
-
-
-def _fetch(store: pooch.Pooch, name: str, data: DataSet) -> Path:
-    """A file from the cache, or downloaded into it; a file with a wrong hash is removed."""
-    for _ in range(_ATTEMPTS):
-        file = Path(store.fetch(name, progressbar=True))
-        if not (fault := data.find_fault(file)):
-            return file
-        file.unlink()
-    raise OSError(f"{name}: {fault}")
+    failed = f"{name} could not be downloaded from {data.url}"
+    advice = f"go online, or put its files into a folder {name}/ and name its parent in ${DATA_DIR_VARIABLE}"
+    with explain_errors(failed, advice):
+        return [Path(store.fetch(file, progressbar=True)) for file in data.hashes]
 
 
 def _expand(name: str | Path) -> list[Path]:
     """The regular files that a path stands for; reading a FIFO or a device would never end."""
     path, shown = Path(name), printable(name)
-    with explain_errors(
-        f"{shown}: cannot be looked up", f"expected {_NAMED}, or paths"
-    ):
-        found = [path] if path.exists() or path.is_symlink() else []
+    expected = f"expected {_NAMED}, or a file, folder or glob of tracks"
+    with explain_errors(f"{shown}: cannot be looked up", expected):
+        pattern = str(path.relative_to(path.anchor))
+        found = [path] if path.exists() else list(Path(path.anchor).glob(pattern))
         if path.is_dir():
             found = [file for file in path.iterdir() if not file.name.startswith(".")]
-        elif not found:
-            found = list(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
     files = sorted(filter(Path.is_file, found))
     if not files:
-        reason = "is no regular file (or leads nowhere)" if found else "no such file"
-        raise DataError(
-            f"{shown}: {reason}; expected {_NAMED}, or a file, folder or glob of tracks"
-        )
-    inner = sum(map(Path.is_dir, found)) if path.is_dir() else 0
-    if others := len(found) - len(files) - inner:
-        warn(
-            f"{shown}: left out what is no regular file: {others} x folder or other", 4
-        )
+        reason = "is no regular file" if found else "no such file"
+        raise DataError(f"{shown}: {reason}; {expected}")
     return files

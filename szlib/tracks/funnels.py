@@ -9,6 +9,7 @@ are seen every few seconds at the latest, and a site is between a metre and a ki
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
@@ -34,9 +35,7 @@ LAST_SECOND = 4_102_444_800.0
 FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 # number of rows, the first ones, by which the motion of people is judged
 MAX_ROWS = 200_000
-# Positions within the first [m] of the origin are metres that were read as a smaller unit; a site wider
-# than the second [m] is millimetres that were read as metres.
-_SITES = (0.5, 1000.0)
+_WIDEST = 1000.0  # widest site of people who certainly walk [m]
 # greatest median and greatest 90 % quantile of the speed of people [m/s]
 _FASTEST = (3.0, 6.0)
 # smallest and greatest 90 % quantile of the speed where people certainly walk [m/s]
@@ -155,12 +154,8 @@ def table(stages: Stages) -> pd.DataFrame:
 
 def text(stages: Stages) -> str:
     """The table of `stages` as plain text in which each stage is named once."""
-    lines = table(stages)
-    lines["stage"] = lines["stage"].mask(lines["stage"].duplicated(), "")
-    lines["rows"] = lines["rows"].map("{:11,}".format)
-    for name in ("stage", "what"):
-        lines[name] = lines[name].str.ljust(int(lines[name].str.len().max()))
-    return "\n".join(map("  ".join, lines.to_numpy()))
+    counts = table(stages).set_index(["stage", "what"])["rows"]
+    return counts.map("{:,}".format).to_string(header=False)
 
 
 def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
@@ -173,14 +168,14 @@ def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
     >>> funnels.add(days)
     [{'stage': 'read', 'entered': 15, 'kept': 14, 'rejected': {'not finite': 1}}]
     """
-    rows = table([*chain.from_iterable(funnels)])
-    added = []
-    for name, part in rows.groupby("stage", sort=False):
-        counts = part.groupby("what", sort=False)["rows"].sum().to_dict()
-        entered, kept = counts.pop("entered"), counts.pop("kept")
-        reasons = {str(what)[2:]: count for what, count in counts.items()}
-        added.append(stage(str(name), entered, kept, reasons))
-    return added
+    added: dict[str, dict[str, Any]] = {}
+    for each in chain.from_iterable(funnels):
+        name = each["stage"]
+        total = added.get(name, stage(name, 0, 0, {}))
+        counts = (Counter(total["rejected"]) + Counter(each["rejected"])).items()
+        entered, kept = (total[key] + each[key] for key in ("entered", "kept"))
+        added[name] = stage(name, entered, kept, dict(counts))
+    return list(added.values())
 
 
 # --- rows ---------------------------------------------------------------------------------------------
@@ -243,7 +238,7 @@ class Motion(NamedTuple):
             and self.high_speed <= _WALKS[1]
             and self.irregularity <= _REGULAR
             and _STEPS[0] <= self.interval <= _STEPS[1]
-            and 1 <= self.width <= _SITES[1]
+            and 1 <= self.width <= _WIDEST
             and self.roughness < _ROUGH
         )
 
@@ -287,7 +282,7 @@ def first_rows(rows: pl.DataFrame) -> np.ndarray:
 def check_people(
     rows: Rows, good: pl.DataFrame, given: Recipe, suggest: Callable[[], str]
 ) -> None:
-    """Raise DataError where people cannot move like this, or on such a site; suggest another reading.
+    """Raise DataError where people cannot move like this; suggest another reading.
 
     Where the user has given the unit, the motion gives a DataWarning instead.  People who do not walk may all
     be standing: that is an error only where another reading makes them walk.
@@ -317,15 +312,6 @@ def check_people(
             raise DataError(
                 f"{message}; if people do move like that, {advise(unit='m')}"
             )
-    metres, reach = recipe.metres, np.abs(seen[2:]).max()
-    is_small = metres < 1 and reach < _SITES[0]
-    spread = reach if is_small else _spread(seen[2:])
-    if not is_given and (is_small or (metres == 1 and spread > _SITES[1])):
-        unit, other = ("m", "mm") if is_small else ("mm", "m")
-        raise DataError(
-            f"{rows.path}: positions span {spread:.3g} m, read as {recipe.file_format}; if they are in "
-            f"{unit}, {advise(unit=unit)}; if the site is of that size, {advise(unit=other)}"
-        )
 
 
 def find_implausible(rows: pl.DataFrame) -> list[str]:

@@ -58,7 +58,7 @@ class LoadedFile(NamedTuple):
     path : the file.
     recipe : how it was read, with its columns.
     rows : its usable rows: day, id, t [s], x, y [m].
-    is_named : whether its name is its day: it has no calendar, and can be a piece of a recording.
+    is_named : whether its name is its day: it has no calendar.
     stage : its stage of the funnel.
     """
 
@@ -235,8 +235,7 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
     dates = good.get_column("day", default=local_dates(good["t"], recipe))
     day = lit(file_stem(path)) if dates is None else dates
     good = good.select(day.alias("day"), "id", "t", "x", "y")
-    is_named = dates is None and not recipe.shape.is_sequence
-    return LoadedFile(path, recipe, good, is_named, stage)
+    return LoadedFile(path, recipe, good, dates is None, stage)
 
 
 def _count_rejected(
@@ -338,73 +337,42 @@ def local_dates(t: Series, recipe: Recipe) -> Series | None:
 def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     """Give different recordings among `files` another `day`, so that no person is in two of them.
 
-    Files without a calendar are recordings of their own, called by their names, unless people continue from
-    one to the other, as in pieces of one recording (EWAP files never are).  Files of a calendar day are its
-    pieces.  If most of the people in both of two files are in two places at once, the files are separate
-    recordings after all, with a DataWarning; if only some are, a DataError is raised.
+    Files without a calendar are recordings of their own, called by their names.  Files of a calendar day are
+    its pieces.  Raises DataError where somebody in two of them is in two places at once, or two recordings
+    have the same name.
     """
-    sequences = [file.path for file in files if file.recipe.shape.is_sequence]
-    check_names(list(map(file_stem, sequences)))
-    names = name_recordings([file.path for file in files])
-    days = list(names)
-    undated = [file.with_day("") if file.is_named else file for file in files]
-    shared = _find_shared_people([file.rows for file in undated])
-    for j, k, _, n_apart, _ in shared:
-        if files[j].is_named and files[k].is_named and not n_apart:
-            days[k] = days[j]
-    found = [f.with_day(days[k]) if f.is_named else f for k, f in enumerate(files)]
-    for j, k, n_together, n_apart, example in shared:
-        is_other = files[j].is_named and files[k].is_named and days[j] != days[k]
-        if is_other or not n_apart:
-            continue
-        where = f"{printable(files[j].path.name)} and {printable(files[k].path.name)}"
-        if n_apart <= n_together or files[k].rows.schema["day"] == String:
-            raise DataError(
-                f"{where}: person {example} is in two places at once ({n_apart} of {n_together + n_apart} "
-                "people in both files are); read these files one by one, or correct them"
-            )
-        warn(
-            f"{where}: {n_apart} people are in two places at once; read as two recordings"
-        )
-        day = pl.format("{} {}", col.day.cast(String), lit(names[k]))
-        found[k] = files[k].with_day(day)
-    return found
-
-
-def _find_shared_people(parts: Sequence[pl.DataFrame]) -> list[Any]:
-    """Pairs of the rows of files that share people.
-
-    For each: the numbers of both files, how many people continue from one to the other, how many are in two
-    places at once, and one of the latter.
-    """
+    paths = [file.path for file in files]
+    names = name_recordings(paths)
+    check_names(
+        [name for name, file in zip(names, files, strict=True) if file.is_named]
+    )
+    named = [
+        file.with_day(name) if file.is_named else file
+        for file, name in zip(files, names, strict=True)
+    ]
     keys = [col.day.cast(String), col("id", "t", "x", "y")]
-    rows = pl.concat(part.select(*keys, file=k) for k, part in enumerate(parts))
-    person, pair, file = ["day", "id"], ["j", "k"], col.file
-    rows = rows.filter((file.min() != file.max()).over(person))
-    rows = rows.sort(*person, "t", "file")
-    step = rows.with_columns(col("t", "x", "y").diff().over(person))
-    before = file.shift().over(person)
-    steps = step.with_columns(
-        j=pl.min_horizontal(file, before), k=pl.max_horizontal(file, before)
-    ).filter(col.j != col.k, col.t <= _SOON)
-    is_apart = (col.x**2 + col.y**2).sqrt() > _BLUR + _FASTEST * col.t
-    people = steps.group_by(*person, *pair).agg(apart=is_apart.any())
-    people = people.sort(*pair, "apart", *person)
-    n_apart, n_together = col.apart.sum(), (~col.apart).sum().alias("together")
-    pairs = people.group_by(pair, maintain_order=True)
-    return pairs.agg(n_together, n_apart, pl.last("id")).rows()
+    rows = pl.concat(f.rows.select(*keys, file=k) for k, f in enumerate(named))
+    rows = rows.filter((col.file.min() != col.file.max()).over("day", "id"))
+    step = col("t", "x", "y", "file").diff().over("day", "id")
+    steps = rows.sort("day", "id", "t").with_columns(step)
+    length = (col.x**2 + col.y**2).sqrt()
+    is_apart = (col.file != 0) & (col.t <= _SOON) & (length > _BLUR + _FASTEST * col.t)
+    apart = steps.filter(is_apart)
+    if apart.height:
+        day, person = apart.select("day", "id").row(0)
+        raise DataError(
+            f"{', '.join(names[:3])}: person {person} is in two places at once on {day}; read these files "
+            "one by one, or name the column of the recording: columns={'day': ...}"
+        )
+    return named
 
 
 def name_recordings(files: Sequence[Path]) -> list[str]:
     """A name for each of `files`: without its ending, with its folder where two files have the same name."""
     stems = [file_stem(file) for file in files]
-    names = [
+    return [
         f"{file.parent.name}-{stem}" if stems.count(stem) > 1 else stem
         for file, stem in zip(files, stems, strict=True)
-    ]
-    return [
-        f"{n} ({names[:k].count(n) + 1})" if n in names[:k] else n
-        for k, n in enumerate(names)
     ]
 
 

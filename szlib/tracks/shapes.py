@@ -21,11 +21,10 @@ import polars as pl
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.dataset  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
-import shapely
 from polars import Series, col, selectors
 
 from ..core.checks import check_columns
-from ..core.errors import DataError, SzlibError, warn
+from ..core.errors import DataError, SzlibError
 from ..core.input_files import explain_errors, reading
 from .recipe import SHAPES, Recipe, Shape
 from .sources import File, Source, check_size, open_text
@@ -37,11 +36,10 @@ _ROWS_AT_ONCE, _VALUES_AT_ONCE = 4096, 100
 # Sessions of THOR-MAGNI are nearer to each other than this share of the usual step of the clock.
 _SESSION = 0.5
 
-# Frames a second of EWAP files: ETH; hotel, zara and students.  A track ends after so many sampling intervals
-# without a sample: 0.9 s where samples are 0.4 s apart.
-_EWAP_RATES, _EWAP_GAP = (15.0, 25.0), 2.25
-# A rate needs so many steps of at least this length [m], and is at most this share off.
-_EWAP_STEPS, _EWAP_STEP, _EWAP_ERROR = 10, 0.02, 0.1
+# Frames a second of EWAP files: ETH; hotel, zara and students.
+_EWAP_RATES = (15.0, 25.0)
+# The rate follows from steps of at least this length [m], and is at most this share off.
+_EWAP_STEP, _EWAP_ERROR = 0.02, 0.1
 # Frames a second to which PedPy brings footsteps: those of the clock.
 _VADERE_RATE = 10.0
 _PEDPY_ADVICE = (
@@ -85,12 +83,10 @@ def open_table(table: Any, where: Path) -> Source:
     """A `table` of another library, called `where` in messages; see `is_table`."""
     if isinstance(table, Source):
         return table
-    if hasattr(table, "to_point_gdf"):  # MovingPandas
-        table = table.to_point_gdf()
     if not isinstance(table, pd.DataFrame):
         columns = pl.DataFrame(table)
         return Source(where, columns.columns, columns.to_series)
-    frame = _with_points(table, where)
+    frame = table
 
     def column(at: int) -> Series:
         """A column of the table; one of mixed types as text."""
@@ -99,22 +95,6 @@ def open_table(table: Any, where: Path) -> Source:
         return Series(values.astype("string") if is_mixed else values)
 
     return Source(where, list(map(str, frame.columns)), column)
-
-
-def _with_points(table: pd.DataFrame, where: Path) -> pd.DataFrame:
-    """A table with x, y of its points, as in GeoPandas, and with t of its index if this holds dates."""
-    name = str(table.index.name or "t")
-    if isinstance(table.index, pd.DatetimeIndex) and name not in table.columns:
-        table = table.reset_index(names=name)
-    points = getattr(table, "geometry", None)
-    if points is None or {"x", "y"} <= set(table.columns):
-        return table
-    if getattr(getattr(table, "crs", None), "is_geographic", False):
-        advice = "project them to metres: table.to_crs(table.estimate_utm_crs())"
-        raise DataError(f"{where}: its points are in degrees; {advice}")
-    shapes = np.asarray(points, object)
-    flat = pd.DataFrame(table.drop(columns=points.name))
-    return flat.assign(x=shapely.get_x(shapes), y=shapely.get_y(shapes))
 
 
 def open_arrow(file: File) -> Source:
@@ -164,7 +144,9 @@ def open_json(file: File) -> Source:
         elif '"FeatureCollection"' in content[:1000]:
             rows = [
                 each["properties"]
-                | dict(zip("xy", each["geometry"]["coordinates"], strict=False))
+                | dict(
+                    zip(("lon", "lat"), each["geometry"]["coordinates"], strict=False)
+                )
                 for each in json.loads(content)["features"]
             ]
         else:
@@ -221,45 +203,23 @@ def open_database(file: File) -> list[Source]:
 # --- shapes that have a parser ------------------------------------------------------------------------
 
 
-def _parse_splines(file: File) -> ParsedFile:
-    """UCY's splines: each person's control points x, y [pixels from the middle], frame, direction."""
-    lines, rows = iter(file.text().splitlines()), list[list[Any]]()
-    for person in range(1, int(next(lines).split()[0]) + 1):
-        for _point in range(int(next(lines).split()[0])):
-            rows.append([person, *next(lines).split()[:3]])
-    return pl.DataFrame(rows, schema=["id", "x", "y", "frame"], orient="row"), {}
-
-
 def _parse_ewap(file: File) -> ParsedFile:
     """EWAP counts frames: their rate follows from the displacement in a frame, and the velocity."""
     source = open_text(file, has_header=False)
     columns = {"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
     texts = pl.DataFrame({name: source.column(k) for name, k in columns.items()})
-    rows = texts.cast(pl.Float64, strict=False)
-    rows = rows.filter(pl.all_horizontal(pl.all().is_finite())).sort("id", "frame")
+    rows = texts.cast(pl.Float64, strict=False).sort("id", "frame")
     steps = rows.select(
         col("frame", "x", "y").diff().over("id"),
         col("vx", "vy").rolling_mean(2).over("id"),
-    ).filter(col.frame > 0)
+    )
     length = col.x**2 + col.y**2
     far = steps.filter(length > _EWAP_STEP**2)
     along = col.x * col.vx + col.y * col.vy
-    rates = far.select(along * col.frame / length).to_numpy()
-    median = np.median(rates) if len(rates) >= _EWAP_STEPS else 0.0
-    near = [r for r in _EWAP_RATES if abs(median - r) < _EWAP_ERROR * r]
-    rate = file.recipe.frame_rate or next(iter(near), None)
-    if rate is None:
-        raise DataError(
-            f"{file.path}: the frame rate cannot be estimated from the file's velocities; pass frame_rate=15 "
-            "(ETH) or 25 (hotel, zara, students), or what the video has"
-        )
-    if near and abs(rate - near[0]) > _EWAP_ERROR * near[0]:
-        warn(
-            f"{file.path.name}: read at {rate:g} frames/s as given; its velocities suggest {near[0]:g}"
-        )
-    interval = steps["frame"].median()
-    gap = _EWAP_GAP * interval / rate if isinstance(interval, float) else None
-    return source, {"frame_rate": rate, "max_gap": gap}
+    median = far.select(along * col.frame / length).to_series().median()
+    rates = np.array([median], float)  # NaN where nobody walks
+    near = [rate for rate in _EWAP_RATES if abs(rates[0] - rate) < _EWAP_ERROR * rate]
+    return source, {"frame_rate": near[0]} if near else {}
 
 
 def _parse_trajnet(file: File) -> ParsedFile:
@@ -272,19 +232,6 @@ def _parse_trajnet(file: File) -> ParsedFile:
     frames = np.unique(table["f"])
     step = np.diff(frames).min() if len(frames) > 1 else 1.0
     return table, {"frame_rate": float(step * min(rates, default=2.5))}
-
-
-def _parse_pathfinder(file: File) -> ParsedFile:
-    """JSON of Pathfinder: an object of people, each an object of times.
-
-    PedPy reads it as well, but rounds the number of frames a second: 2.5 becomes 2, and people slow.
-    """
-    rows = [
-        {"t": t, "id": person} | at["position"]
-        for person, times in json.loads(file.text()).items()
-        for t, at in times.items()
-    ]
-    return pd.DataFrame(rows), {}
 
 
 def read_magni_rows(path: Path, plain: Path | None = None) -> pd.DataFrame:
@@ -362,9 +309,9 @@ def _parse_nuscenes(file: File) -> ParsedFile:
 
 
 PARSERS: dict[str, Callable[[File], ParsedFile]] = {
-    "splines": _parse_splines, "ewap": _parse_ewap, "trajnet": _parse_trajnet,
+    "ewap": _parse_ewap, "trajnet": _parse_trajnet,
     "magni": lambda file: (read_magni_rows(file.path, file.plain), {}),
-    "pathfinder": _parse_pathfinder, "wide": _parse_wide, "level_x": _parse_level_x,
+    "wide": _parse_wide, "level_x": _parse_level_x,
     "nuscenes": _parse_nuscenes,
 }  # fmt: skip
 
@@ -393,7 +340,5 @@ def _load_by_pedpy(loader: str, file: File) -> ParsedFile:
         given = {"frame_rate": _VADERE_RATE}
     load = getattr(pedpy, f"load_trajectory_from_{loader}")
     loaded = load(trajectory_file=file.plain, **given)
-    if not (rate := float(loaded.frame_rate)) > 0:
-        raise ValueError(f"it states {rate:g} frames/s; expected a positive number")
     rows = pd.DataFrame(loaded.data)[["frame", "id", "x", "y"]]
-    return rows, {"frame_rate": rate, "unit": "m"}
+    return rows, {"frame_rate": float(loaded.frame_rate), "unit": "m"}

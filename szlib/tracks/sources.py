@@ -16,17 +16,17 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import polars as pl
 from polars import Float64, Series, String, col
 
 from ..core.errors import DataError, StorageError
-from ..core.files import temporary_folder
 from ..core.input_files import (
     explain_errors,
+    opening,
     printable,
-    readable_path,
     require_memory,
     unchanged_files,
 )
@@ -122,9 +122,8 @@ class Rows:
 
 
 def is_table(source: object) -> bool:
-    """Whether `source` is a table of pandas, Polars, Arrow, GeoPandas, MovingPandas or PedPy, and no path."""
-    names = "__arrow_c_stream__", "to_point_gdf", "frame_rate"
-    return any(hasattr(source, name) for name in names)
+    """Whether `source` is a table of pandas, Polars, Arrow or PedPy, and no path."""
+    return hasattr(source, "__arrow_c_stream__") or hasattr(source, "frame_rate")
 
 
 # --- packed files -------------------------------------------------------------------------------------
@@ -147,19 +146,20 @@ def open_plain(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[
     for fault, holds in faults.items():
         if holds:
             raise DataError(f"{shown}: {fault}")
+    plain, advice = path, "make room, or name another one in $TMPDIR"
     with unchanged_files([path]), ExitStack() as stack:
-        plain = readable_path(path)
-        with plain.open("rb") as stream:
+        with opening(path), path.open("rb") as stream:
             is_packed = stream.read(4).startswith((b"PK\3\4", b"\x1f\x8b"))
         if is_packed:
-            target = stack.enter_context(temporary_folder()) / "unpacked"
-            unpack(plain, path, target)
-            plain = target
+            with explain_errors("no temporary folder", advice, StorageError):
+                folder = TemporaryDirectory(prefix="szlib-")
+            plain = Path(stack.enter_context(folder)) / "unpacked"
+            unpack(path, plain)
         yield File(plain, path, recipe, size)
 
 
-def unpack(plain: Path, path: Path, target: Path) -> None:
-    """Unpack the file `plain`, given as `path`, into `target`.
+def unpack(path: Path, target: Path) -> None:
+    """Unpack the file `path` into `target`.
 
     Failure to read means damage, failure to write a lack of room.  The disk is never filled.
     """
@@ -170,7 +170,7 @@ def unpack(plain: Path, path: Path, target: Path) -> None:
     with (
         explain_errors(full, advice, StorageError, OSError),
         explain_errors(damaged, "fetch the file again", faults=damage),
-        _open_packed(plain, path) as packed,
+        _open_packed(path) as packed,
         target.open("wb") as unpacked,
     ):
         while block := packed.read(1 << 22):
@@ -180,11 +180,11 @@ def unpack(plain: Path, path: Path, target: Path) -> None:
             unpacked.write(block)
 
 
-def _open_packed(plain: Path, path: Path) -> Any:
+def _open_packed(path: Path) -> Any:
     """The content of a gzipped file, or the one file in a zip archive."""
-    if not zipfile.is_zipfile(plain):
-        return gzip.open(plain)
-    archive = zipfile.ZipFile(plain)
+    if not zipfile.is_zipfile(path):
+        return gzip.open(path)
+    archive = zipfile.ZipFile(path)
     names = [name for name in archive.namelist() if not name.endswith("/")]
     if any(name.startswith("xl/") for name in names):
         command = f"polars.read_excel({path.name!r}).write_csv({path.stem + '.csv'!r})"

@@ -27,7 +27,7 @@ import pandas as pd
 from scipy.stats import beta
 
 from ..core.checks import check_columns, require
-from ..core.input_files import read_json_object
+from .folders import read_json_object
 from .record.display import format_result
 from .record.notebook_record import NotebookRecord
 

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..core.errors import DataError, DataWarning, SzlibError
-from ..core.input_files import granted_memory, parse_size, printable
+from ..core.input_files import MEMORY_VARIABLE, environment, parse_size, printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,9 +55,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with _stop_on_signals(), warnings.catch_warnings():
             options = build_parser().parse_args(arguments)
-            size = None if options.memory is None else parse_size(options.memory)
+            memory = options.memory and {
+                MEMORY_VARIABLE: str(parse_size(options.memory))
+            }
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
-            with granted_memory(size):
+            with environment(**memory or {}):
                 code = int(options.command(options))
             sys.stdout.flush()
         return code

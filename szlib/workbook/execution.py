@@ -26,7 +26,8 @@ from jupyter_client.provisioning.local_provisioner import LocalProvisioner
 
 from ..core.errors import SzlibError
 from ..core.files import write_file
-from ..core.input_files import printable, read_json_object
+from ..core.input_files import printable
+from .folders import read_json_object
 from .record.data_cache import describe_missing_data
 from .record.parameters import METHOD_DEFAULTS, read_defaults
 

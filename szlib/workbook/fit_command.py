@@ -26,14 +26,14 @@ from .. import (
     read_tracks,
 )
 from ..core.files import folder_purpose, write_file
-from ..core.input_files import file_content, printable, read_json_object
+from ..core.input_files import file_content, printable
 from ..encounters import days as several_days
 from ..tracks import datasets
 from ..zones.outliers import R_MAX
 from ..zones.social_zone import FORMAT
 from ..zones.uncertainty import N_RESAMPLES
 from ..zones.verdict import describe_missing_encounters
-from .folders import require_place
+from .folders import read_json_object, require_place
 from .record.data_cache import find_null_model
 
 # The verdicts of a zone say what its warnings say; those of reading and of the area are shown.

@@ -17,13 +17,14 @@ import os
 import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import DataError, StorageError
 from ..core.files import claim_folder, folder_purpose
-from ..core.input_files import printable
+from ..core.input_files import printable, read_small
 from ..tracks import datasets
 
 # The folder of the notebooks: in an installed package, or beside the package in the repository.
@@ -157,10 +158,11 @@ def claim_results(
     Raises
     ------
     DataError : there is no such file.
-    StorageError : the folder cannot be made, holds files of something else, or holds the data.
+    StorageError : the folder cannot be made, or holds files of something else.
     """
     source = absolute_data(data)
-    inputs = [] if source in datasets.NAMES else datasets.find(source)
+    if source not in datasets.NAMES:
+        datasets.find(source)
     purpose = f"{RESULTS_OF}{source if isinstance(source, str) else ', '.join(source)}"
     if parameters:
         purpose += f" with {json.dumps(parameters, sort_keys=True)}"
@@ -170,7 +172,7 @@ def claim_results(
         folder = folder.with_name(
             f"{folder.name}-{hashlib.sha256(purpose.encode()).hexdigest()[:8]}"
         )
-    return claim_folder(folder, purpose, inputs=inputs)
+    return claim_folder(folder, purpose)
 
 
 def remove_outputs(folder: Path, notebooks: Iterable[str]) -> None:
@@ -184,6 +186,13 @@ def remove_outputs(folder: Path, notebooks: Iterable[str]) -> None:
         files += (folder / "figures").glob(f"{name}-*")
     for file in files:
         file.unlink(missing_ok=True)
+
+
+def read_json_object(path: Path) -> dict[str, Any]:
+    """The object in the small JSON file `path`; empty if the file is missing or damaged."""
+    with suppress(OSError, ValueError, TypeError, RecursionError):
+        return dict(json.loads(read_small(path)))
+    return {}
 
 
 def require_place(file: Path) -> Path:

@@ -12,22 +12,24 @@ import platform
 import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
 import psutil
+from filelock import FileLock
 from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from .. import __version__
-from ..core.errors import DataError
-from ..core.files import folder_lock, temporary_folder, write_file
-from ..core.input_files import MEMORY_VARIABLE, memory_limit, read_json_object
+from ..core.errors import DataError, StorageError
+from ..core.files import write_file
+from ..core.input_files import MEMORY_VARIABLE, explain_errors, memory_limit
 from ..core.parallel import limit_jobs, safe_path
 from ..tracks import datasets, funnels
 from . import folders
@@ -88,7 +90,7 @@ def run(
     root = folders.default_results(place) if out is None else folders.results_root(out)
     data = folders.absolute_data(data)
     home = folders.claim_results(root, data, given)
-    with folder_lock(home), safe_path():
+    with _folder_lock(home), safe_path():
         source = _describe_source(home, data, given)
         names = [script.stem for script in scripts]
         outcomes = _stored_outcomes(home, source, known)
@@ -109,6 +111,21 @@ def run(
 
             source["report"] = str(write_report(home, summary))
     return _summarise(source, {name: outcomes[name] for name in names})
+
+
+@contextmanager
+def _folder_lock(folder: Path) -> Iterator[None]:
+    """Reserve a `folder` for this process; the lock ends with the process.
+
+    Raises StorageError where another process has reserved it, or where this one may not write.
+    """
+    lock = FileLock(folder / ".szlib-lock-run", timeout=0)
+    failed = f"{folder}: cannot be written, or another process is writing there"
+    advice = "wait until it ends, or choose another folder"
+    with ExitStack() as stack:
+        with explain_errors(failed, advice, StorageError, OSError):
+            stack.enter_context(lock)
+        yield
 
 
 def _describe_source(
@@ -189,8 +206,8 @@ def _execute_all(
     options = {"backend": "threading", "return_as": "generator_unordered"}
     workers = Parallel(max(jobs, 2), pre_dispatch=jobs, batch_size=1, **options)
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
-    with bar, temporary_folder() as private:
-        environment |= {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
+    with bar, TemporaryDirectory(prefix="szlib-") as private:
+        environment |= {"TMPDIR": private, "IPYTHONDIR": private}
 
         def execute(script: Path) -> tuple[str, dict[str, Any]]:
             """The name of a notebook and its outcome."""
@@ -243,7 +260,7 @@ def _stored_outcomes(
     home: Path, source: Mapping[str, Any], known: Iterable[Path]
 ) -> dict[str, dict[str, Any]]:
     """The outcomes of `known` notebooks in an earlier run of the same version, data and parameters."""
-    stored = read_json_object(home / SUMMARY)
+    stored = folders.read_json_object(home / SUMMARY)
     as_stored = json.loads(json.dumps(source))
     outcomes = stored["notebooks"] if as_stored.items() <= stored.items() else {}
     return {s.stem: outcomes[s.stem] for s in known if s.stem in outcomes}

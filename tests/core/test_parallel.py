@@ -1,11 +1,9 @@
 """Processes end with the one that started them, whenever it is killed."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,14 +15,6 @@ if __name__ == "__main__":
     print("begun", flush=True)
     list(run_tasks([joblib.delayed(time.sleep)(60)] * 2, n_jobs=2))
 """
-
-
-@pytest.mark.parametrize(("parent", "code"), [("os.getppid()", 0), ("10**9", 1)])
-def test_a_worker_whose_parent_ended_before_it_was_up_ends_as_well(
-    parent: str, code: int
-) -> None:
-    program = f"import os; from szlib.core.parallel import end_with; end_with({parent})"
-    assert subprocess.run([sys.executable, "-c", program]).returncode == code
 
 
 @pytest.mark.skipif(
@@ -73,55 +63,3 @@ def _carriers(word: str) -> list[str]:
         except OSError:
             continue
     return found
-
-
-@pytest.mark.skipif(
-    not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm"
-)
-def test_a_closed_terminal_leaves_no_semaphores(tmp_path: Path) -> None:
-    """Every process of the group gets SIGHUP; the process that removes the semaphores must outlive it."""
-    program = tmp_path / "program.py"
-    program.write_text(PROGRAM)
-    parent = subprocess.Popen([sys.executable, str(program)], start_new_session=True)
-
-    def semaphores() -> list[Path]:
-        return list(Path("/dev/shm").glob(f"sem.loky-{parent.pid}-*"))
-
-    assert wait_until(semaphores)
-    time.sleep(0.2)
-    os.killpg(parent.pid, signal.SIGHUP)
-    assert parent.wait() == -signal.SIGHUP
-    assert wait_until(lambda: not semaphores())
-
-
-@pytest.mark.skipif(
-    not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm"
-)
-def test_the_next_run_removes_the_semaphores_of_a_group_that_was_killed(
-    tmp_path: Path,
-) -> None:
-    program = tmp_path / "program.py"
-    program.write_text(PROGRAM)
-    place = os.environ | {"TMPDIR": str(tmp_path)}
-    parent = subprocess.Popen(
-        [sys.executable, str(program)], start_new_session=True, env=place
-    )
-
-    def semaphores() -> list[Path]:
-        return list(Path("/dev/shm").glob(f"sem.loky-{parent.pid}-*"))
-
-    assert wait_until(semaphores)
-    os.killpg(parent.pid, signal.SIGKILL)
-    parent.wait()
-    remove = (
-        "from szlib.core.files import remove_abandoned_temporary as remove; remove()"
-    )
-    subprocess.run([sys.executable, "-c", remove], env=place, check=True)
-    assert not semaphores()
-
-
-def wait_until(condition: Callable[[], object], seconds: float = 60.0) -> bool:
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.05)
-    return bool(condition())

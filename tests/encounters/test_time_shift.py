@@ -4,11 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import DAY, make_tracks, make_walk
+from helpers.valid_tracks import check_tracks
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.core.errors import DataError
-from szlib.tracks.clock import check_tracks, nearest_tick
+from szlib.tracks.clock import nearest_tick
 
 MINUTES = (1.0, 5.0)
 

@@ -76,20 +76,6 @@ def _scaled(factor: float) -> dict[str, Callable]:
     }
 
 
-def _vsp() -> str:
-    """Pixels from the middle of the picture, y up; every fourth position is a control point."""
-    people = hall().assign(**_scaled(PIXEL)).groupby("id")
-    lines = [f"{len(people)} - the number of splines"]
-    for _, one in people:
-        points = one.iloc[::4]
-        lines.append(f"{len(points)} - Num of control points")
-        lines += [
-            f"{r.x:.3f} {r.y:.3f} {r.frame} 90.0 - (2D point, m_id)"
-            for r in points.itertuples()
-        ]
-    return "\n".join([*lines, "0 - Extra data", ""])
-
-
 def _trajnet() -> str:
     rows = hall()
     scene = {
@@ -108,14 +94,6 @@ def _trajnet() -> str:
         )
         + "\n"
     )
-
-
-def _pathfinder_json() -> str:
-    people: dict[str, dict[str, object]] = {}
-    for row in hall().itertuples():
-        place = {"position": {"x": row.x, "y": row.y, "z": 0.0}}
-        people.setdefault(str(row.id), {})[f"{row.t:.2f}"] = place
-    return json.dumps(people)
 
 
 def _pathfinder_csv() -> str:
@@ -188,11 +166,9 @@ TEXTS: dict[str, Callable[[], str]] = {
         "\n"
     )[2],
     "unknown-names.csv": lambda: _table(names="a,b,c,d"),
-    "crowd.vsp": _vsp,
     "trajnet.ndjson": _trajnet,
     "crowdit.csv": lambda: _table(names="time,pedID,posX,posY"),
     "pathfinder.csv": _pathfinder_csv,
-    "pathfinder.json": _pathfinder_json,
     "magni.csv": _magni,
     "obsmat.txt": lambda: as_ewap(hall(), rate=RATE),
     "atc-raw.csv": lambda: as_raw(hall().assign(**_SINCE_1970)),

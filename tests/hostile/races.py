@@ -223,17 +223,4 @@ def rewrite(place: Path, name: str) -> Iterator[None]:
     os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
-@contextlib.contextmanager
-def exchange_folders(place: Path, name: str) -> Iterator[None]:
-    """Give the folder of the file the name of another one; no file is touched."""
-    data, other, away = place / "data", place / "other", place / "away"
-    for old, new in ((data, away), (other, data)):
-        old.rename(new)
-    yield
-    for old, new in ((data, other), (away, data)):
-        old.rename(new)
-
-
-SWAPS: dict[str, Swap] = {
-    each.__name__: each for each in (rename, rewrite, exchange_folders)
-}
+SWAPS: dict[str, Swap] = {each.__name__: each for each in (rename, rewrite)}

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_tables import real_data
+from helpers.valid_tracks import check_tracks
 from studies import sites
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.clock import check_tracks
 
 # --- Grand Central -----------------------------------------------------------------------------------
 

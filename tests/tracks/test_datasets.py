@@ -76,29 +76,14 @@ def served_days(served, monkeypatch):
     (served / "1028.csv").write_text(
         "".join(f"{1351386000 + t},7,{-t},0.0,1.0,3.1\n" for t in range(9))
     )
-    days = {
-        name: datasets.git_blob_id(served / name) for name in ("1024.csv", "1028.csv")
-    }
+    days = {name: sha256(served / name) for name in ("1024.csv", "1028.csv")}
     change(
         monkeypatch, "atc-10-days", url=datasets.DATA_SETS["atc-1hz"].url, hashes=days
     )
     return served
 
 
-def test_git_blob_ids_are_those_of_git(tmp_path):
-    (tmp_path / "a").write_bytes(b"hello world\n")
-    assert (
-        datasets.git_blob_id(tmp_path / "a")
-        == "3b18e512dba79e4c8300dd08aeb37f8e728b8dad"
-    )
-    (tmp_path / "a").write_bytes(b"")
-    assert (
-        datasets.git_blob_id(tmp_path / "a")
-        == "e69de29bb2d1d6434b8b29ae775ad8c2e48c5391"
-    )
-
-
-def test_ten_days_are_downloaded_once_and_verified_by_blob_id(served_days, tmp_path):
+def test_ten_days_are_downloaded_once_and_verified(served_days, tmp_path):
     files = datasets.find("atc-10-days")
     assert [file.name for file in files] == ["1024.csv", "1028.csv"]
     assert files[0].parent == tmp_path / "cache" / "szlib" / "atc-10-days"
@@ -109,12 +94,9 @@ def test_ten_days_are_downloaded_once_and_verified_by_blob_id(served_days, tmp_p
     )
     files[1].write_text("damaged")
     with pytest.raises(
-        DataError, match=r"atc-10-days could not be downloaded.*1028\.csv: its hash is"
+        DataError, match=r"atc-10-days could not be downloaded.*1028\.csv"
     ):
         datasets.find("atc-10-days")
-    assert files[0].exists() and not files[1].exists(), (
-        "a file with a wrong hash is removed"
-    )
 
 
 def test_ten_days_are_read_from_a_data_folder(served_days, tmp_path, monkeypatch):
@@ -125,7 +107,7 @@ def test_ten_days_are_read_from_a_data_folder(served_days, tmp_path, monkeypatch
     monkeypatch.setenv(datasets.DATA_DIR_VARIABLE, str(tmp_path / "data"))
     assert datasets.find("atc-10-days") == [folder / "1024.csv", folder / "1028.csv"]
     (folder / "1028.csv").write_text("damaged")
-    with pytest.raises(DataError, match=r"1028\.csv: its hash is .* expected"):
+    with pytest.raises(DataError, match=r"1028\.csv needs to update"):
         datasets.find("atc-10-days")
 
 
@@ -147,14 +129,11 @@ def test_ten_days_are_dated_by_file_name_in_japan(served_days, tmp_path):
     assert (extracted.table["status"] == "done").all()
 
 
-def test_every_file_of_a_named_data_set_has_a_hash():
-    for name, n_files, n_digits in (("atc-1hz", 23, 64), ("atc-10-days", 10, 40)):
-        hashes = datasets.DATA_SETS[name].hashes
-        assert len(hashes) == n_files
-        assert all(
-            len(digits) == n_digits and int(digits, 16) for digits in hashes.values()
-        )
-    assert hashes["1024.csv"] == "0c7f0c52acc32fc37123141de8ce0b0bbb38100d"
+def test_every_file_of_the_real_day_has_a_hash():
+    hashes = datasets.DATA_SETS["atc-1hz"].hashes
+    assert len(hashes) == 23
+    assert all(len(digits) == 64 and int(digits, 16) for digits in hashes.values())
+    assert len(datasets.DATA_SETS["atc-10-days"].hashes) == 10
 
 
 def test_without_network_the_error_names_the_data_folder(served, tmp_path, monkeypatch):
@@ -172,10 +151,7 @@ def test_a_data_folder_is_used_and_verified(tmp_path, monkeypatch):
     change(monkeypatch, "atc-1hz", hashes={"a.csv": sha256(folder / "a.csv")})
     assert datasets.find("atc-1hz") == [folder / "a.csv"]
     (folder / "a.csv").write_text("other")
-    with pytest.raises(DataError, match=r"a\.csv: its hash is .* expected"):
-        datasets.find("atc-1hz")
-    (folder / "a.csv").unlink()
-    with pytest.raises(DataError, match=r"a\.csv: no such file; \$SZLIB_DATA_DIR"):
+    with pytest.raises(DataError, match=r"a\.csv needs to update"):
         datasets.find("atc-1hz")
 
 
@@ -252,6 +228,8 @@ def test_a_download_is_repeated_until_the_server_recovers(
     assert [path.name for path in file.parent.iterdir()] == ["a.csv"]
 
 
+# the connection to the server, which pooch leaves to the collector of garbage
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("fault", ["error 500", "truncated", "wrong content"])
 def test_a_failed_download_leaves_no_partial_file(server_faults, tmp_path, fault):
     server_faults += [fault] * 99

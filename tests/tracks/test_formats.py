@@ -13,10 +13,11 @@ import pandas as pd
 import pytest
 from helpers.track_files import RATE, in_seconds, people, samples, write
 from helpers.track_tables import make_crowd
+from helpers.valid_tracks import check_tracks
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.clock import check_tracks, to_clock
+from szlib.tracks.clock import to_clock
 from szlib.tracks.readers import read_raw
 
 
@@ -157,7 +158,7 @@ def test_wrong_options_for_a_table_are_refused(message: str) -> None:
 
 def test_columns_that_a_format_has_not_are_refused(tmp_path: Path) -> None:
     file = write(tmp_path / "a.csv", in_seconds(people()).to_csv(index=False))
-    with pytest.raises(szlib.DataError, match="has no column t; it has"):
+    with pytest.raises(szlib.DataError, match="has no column t; "):
         szlib.read_tracks(file, columns={"t": "t"}, file_format="atc-1hz")
 
 

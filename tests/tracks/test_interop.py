@@ -1,4 +1,4 @@
-"""What a track table must be, for every format; groups; conversion to PedPy."""
+"""What a track table must be, for every format; tables of PedPy."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.track_files import WRITERS, samples
-from helpers.track_tables import make_crowd, make_tracks, make_walk
+from helpers.track_tables import make_crowd
+from helpers.valid_tracks import check_tracks
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.clock import COLUMNS, check_tracks, to_clock, to_pedpy
+from szlib.tracks.clock import COLUMNS, to_clock
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -66,19 +67,6 @@ def test_check_tracks_requires_a_funnel_that_adds_up() -> None:
         check_tracks(tracks)
 
 
-def test_tracks_are_the_same_after_conversion_to_pedpy_and_back() -> None:
-    pytest.importorskip("pedpy")
-    tracks = good_tracks()
-    trajectory = to_pedpy(tracks)
-    assert trajectory.frame_rate == 10
-    assert trajectory.number_pedestrians == tracks["id"].nunique()
-    back = szlib.read_tracks(trajectory)
-    check_tracks(back)
-    pd.testing.assert_frame_equal(
-        back[COLUMNS[1:]], tracks[COLUMNS[1:]], rtol=0, atol=1e-9
-    )
-
-
 def test_pedpy_tracks_at_25_hz_are_brought_to_the_clock() -> None:
     pedpy = pytest.importorskip("pedpy")
     frames = np.arange(50)
@@ -87,12 +75,3 @@ def test_pedpy_tracks_at_25_hz_are_brought_to_the_clock() -> None:
     check_tracks(tracks)
     np.testing.assert_allclose(tracks["x"], 1.2 * tracks["t"])
     np.testing.assert_allclose(tracks["vx"], 1.2)
-
-
-def test_tracks_of_several_days_cannot_be_converted_to_pedpy() -> None:
-    pytest.importorskip("pedpy")
-    both = make_tracks(
-        make_walk((0, 0), (1, 0)), make_walk((0, 0), (1, 0), day="2012-10-28")
-    )
-    with pytest.raises(szlib.DataError, match="PedPy has no days, and the table has 2"):
-        to_pedpy(both)

@@ -51,9 +51,6 @@ SPOILED = {
     "pass unit='ft'": lambda: walkers(1.0 / 0.3048),
     "pass time_unit='ms'": lambda: table().assign(t=lambda t: t["t"] * 1e3),
     "only a guess: pass columns={'frame': 't', 'id': 'id', 'x': 'x', 'y': 'y'} and frame_rate=25": frames,
-    "pass unit='deg' and origin=[135.5, 34.7]": lambda: table().assign(
-        x=lambda t: 135.5 + t["x"] / 90_000, y=lambda t: 34.7 + t["y"] / 111_000
-    ),
     "columns={'t': 'id', 'id': 't', 'x': 'x', 'y': 'y'}": lambda: table().rename(
         columns={"t": "id", "id": "t"}
     ),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import gzip
-import os
 import random
 import re
 import warnings
@@ -205,13 +204,12 @@ def test_excluded_days_are_left_out_and_counted(tmp_path: Path) -> None:
         read_raw(path, exclude=["2012-10-25", "2012-10-24"])
 
 
-def test_ewap_files_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_ewap_files_of_one_name_are_recordings_of_their_own(tmp_path: Path) -> None:
     paths = []
     for name in ("eth", "hotel"):
         (tmp_path / name).mkdir()
         paths.append(write(tmp_path / name / "obsmat.txt", as_ewap(samples())))
-    with pytest.raises(szlib.DataError, match="several files are called obsmat"):
-        read_raw(paths)
+    assert set(read_raw(paths)["day"]) == {"eth-obsmat", "hotel-obsmat"}
     assert set(
         read_raw([paths[0], write(tmp_path / "hotel.txt", as_ewap(samples()))])["day"]
     ) == {
@@ -369,9 +367,7 @@ UNUSABLE: dict[str, tuple[str | bytes, str]] = {
     "milliseconds": (as_1hz(samples()).replace(".", ""), "has no column t, id, x, y"),
     "days since 1970": ("t,id,x,y\n15637000000,7,5,5\n", "line 2: time not in seconds since 1970"),
     "places as names": ("t,id,x,y\n1,1,door,5\n2,1,5,6\n3,1,in,\n", "a number (column 'x' holds 'door')"),
-    "metres in a raw file": (as_raw(scaled(1e-3)), "if they are in m, pass unit='m'; if the site"),
     "millimetres, 1 Hz": (as_1hz(scaled(1e3)), "unit='mm'"),
-    "millimetres, EWAP": (as_ewap(scaled(1e3)), "if they are in mm, pass unit='mm'; if"),
     "millimetres, tidy": (as_tidy(scaled(1e3)), "unit='mm'"),
     "PNG": (PNG + bytes(range(256)) * 9, "line 1"),
     "HTML": ("<!doctype html>\n<html><body>404</body></html>\n", "line 1"),
@@ -401,6 +397,19 @@ def test_an_unusable_file_is_refused_with_its_name_and_the_reason(
     assert str(path) in str(error.value)
     assert message in str(error.value)
     assert len(str(error.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(as_raw(scaled(1e-3)), "nobody walks"), (as_ewap(scaled(1e3)), "people move at")],
+)
+def test_another_unit_than_that_of_a_known_format_warns(
+    tmp_path: Path, content: str, message: str
+) -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_raw(write(tmp_path / "given.csv", content))
+    assert message in " ".join(str(each.message) for each in caught)
 
 
 def test_one_file_in_a_zip_archive_is_read_several_are_refused(tmp_path: Path) -> None:
@@ -548,7 +557,7 @@ def test_missing_files_folders_and_locked_files_are_refused(
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(os, "open", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(
         szlib.DataError, match=r"locked\.csv: cannot be opened .*Permission denied"
     ):

@@ -17,7 +17,7 @@ from helpers.file_shapes import BEGIN, PIXEL, RATE, hall
 
 import szlib
 from szlib.core.errors import MemoryLimitError
-from szlib.core.input_files import granted_memory
+from szlib.core.input_files import environment
 from szlib.tracks.columns import metres_in_degree
 from szlib.tracks.readers import read_raw
 from szlib.tracks.recipe import COMMAND_VARIABLE, FILE_NAME
@@ -310,7 +310,7 @@ def test_memory_is_charged_by_decoded_bytes(tmp_path: Path) -> None:
     for name in ("a.parquet", "a.sqlite"):
         assert (tmp_path / name).stat().st_size < 2_000_000
         with (
-            granted_memory(50_000_000),
+            environment(SZLIB_MEMORY="50MB"),
             pytest.raises(MemoryLimitError, match="MB of a column"),
         ):
             read_raw(tmp_path / name)

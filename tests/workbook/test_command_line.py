@@ -115,7 +115,7 @@ def test_error_names_an_address_without_scheduler(
         raise OSError("Timed out trying to connect")
 
     monkeypatch.setattr(distributed, "Client", refuse)
-    message = r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
+    message = r"no Dask scheduler with a worker answers at 'tcp://127\.0\.0\.1:9'"
     with (
         pytest.raises(szlib.SzlibError, match=message),
         parallel.cluster("tcp://127.0.0.1:9"),
@@ -148,7 +148,7 @@ def test_extract_waits_for_workers_that_come_late(day, tmp_path):
         address = json.loads(scheduler_file.read_text())["address"]
         with (
             pytest.raises(
-                szlib.SzlibError, match=r"no worker joined the scheduler .* --wait 600"
+                szlib.SzlibError, match=r"no Dask scheduler with a worker .* --wait 600"
             ),
             parallel.cluster(address, wait=0.5),
         ):

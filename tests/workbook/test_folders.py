@@ -130,8 +130,8 @@ def test_a_folder_is_locked_until_the_process_that_writes_there_ends(
 ):
     run()
     program = f"""
-from szlib.core.files import folder_lock
-with folder_lock({str(tmp_path / "out" / "mine")!r}):
+from filelock import FileLock
+with FileLock({str(tmp_path / "out" / "mine" / ".szlib-lock-run")!r}):
     print("locked", flush=True)
     input()
 """

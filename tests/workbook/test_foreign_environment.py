@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import sys
 import tempfile
 from pathlib import Path
@@ -10,7 +9,6 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from szlib.core import files
 from szlib.workbook import cli, folders, runner
 from szlib.workbook.cli import main
 
@@ -100,21 +98,6 @@ def test_memory_that_is_used_up_is_named(error, monkeypatch, capsys):
     monkeypatch.setattr(cli, "_inspect", fail)
     assert main(["inspect", "day.csv"]) == 2
     assert "szlib: this process has no more memory" in capsys.readouterr().err
-
-
-def test_umask_that_forbids_everything_is_named(
-    notebooks, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    files.process_folder.cache_clear()
-    notebooks(_01_one="")
-    before = os.umask(0o777)
-    try:
-        assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
-    finally:
-        os.umask(before)
-    assert re.search("umask|out: cannot be made", capsys.readouterr().err)
-    assert not list(tmp_path.glob("szlib-*"))
 
 
 @pytest.mark.usefixtures("without_kernels")

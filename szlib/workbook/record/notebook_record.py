@@ -24,7 +24,6 @@ import pandas as pd
 from pandas.io.formats.style import Styler
 
 from ...core.files import claim_folder, write_file
-from ...core.input_files import read_json_object
 from ...tracks import datasets
 from .. import folders
 from .data_cache import DataCache
@@ -106,7 +105,9 @@ class NotebookRecord:
         run = os.environ.get(folders.RUN_VARIABLE)
         if run:
             self.out = Path(run)
-            contents = read_json_object(self.out / folders.PARAMETERS).get("files", [])
+            contents = folders.read_json_object(self.out / folders.PARAMETERS).get(
+                "files", []
+            )
         else:
             results = folders.results_root(variables.get("results", folders.RESULTS))
             claim_folder(results, folders.PURPOSE)
