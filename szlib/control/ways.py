@@ -18,7 +18,7 @@ from __future__ import annotations
 from cmath import phase, rect
 from collections.abc import Hashable, Iterator, Sequence
 from itertools import combinations
-from math import asin, ceil, dist, hypot, inf, pi, sqrt
+from math import acos, ceil, dist, hypot, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -551,32 +551,31 @@ def find_target(
 
     Notes
     -----
-    A person blocks the way if the line to the goal enters the set h < 0. Seen from the robot, this set is
-    taken for a circle around its centre, as wide as it is across the way (exactly so for a round zone). Its
-    two tangents lie at the angles +-w from the centre. Let the goal lie at the angle b from there. At b = 0
-    both ways around are equally long, the optimum is to stand still in front of the person, and every solver
-    stays there for ever. So for |b| <= share * w, with share = `head_on_share`, the target lies along the
-    tangent on `pass_side`, as far away as the goal. Once the robot is on that side, the target turns back to
-    the goal between |b| = share * w and 2 share * w, without a jump. If a wall leaves no space beside the
-    person on that side, the same holds for the other side. If there is no space at all, the target stays the
-    goal, and the robot yields. The paper has no such rule.
+    A person blocks the way if the line to the goal enters the set h < 0, itself an ellipse with the foci of
+    the zone. Its two tangents from the robot lie at the angles +-w about -grad h, the bisector of the
+    directions to the foci (this holds for all confocal ellipses). Let the goal lie at the angle b from there.
+    At b = 0 both ways around are equally long, the optimum is to stand still in front of the person, and
+    every solver stays there for ever. So for |b| <= share * w, with share = `head_on_share`, the target lies
+    along the tangent on `pass_side`, as far away as the goal. Once the robot is on that side, the target
+    turns back to the goal between |b| = share * w and 2 share * w, without a jump. If a wall leaves no space
+    beside the person on that side, the same holds for the other side. If there is no space at all, the
+    target stays the goal, and the robot yields. The paper has no such rule.
 
     The rule holds only if the barrier is active now, h <= closing speed * dt / gamma, or may become so
     within the horizon, h <= closing speed * horizon. (With the first condition alone and gamma > 1/N, the
     slightest tilt of the zone would decide the side before this rule does.) It does not hold for people who
-    walk across the way, because they clear it themselves, nor for those in whose zone the goal lies. The
+    walk across the way, because they clear it themselves, nor for a person who stands on the goal. The
     nearest person counts.
     """
     s, at, way = settings, complex(*position), complex(*goal) - complex(*position)
     nearest, turn = abs(way), 1.0 + 0.0j
-    margin, share = s.r_robot + s.eps, s.head_on_share
     time = s.dt * max(1 / s.gamma, sum(s.step_lengths))
-    for zone in zones if way and share else ():
-        walk, h = complex(*zone[7:9]), ellipse_formula(*position, *zone[:5]) - margin
-        is_across = abs((way.conjugate() * walk).imag) > share * abs(way * walk)
-        is_on_goal = ellipse_formula(*goal, *zone[:5]) < margin
+    for zone in zones if way and s.head_on_share else ():
+        walk = complex(*zone[7:9])
+        across = abs((way.conjugate() * walk).imag)
+        h = ellipse_formula(*position, *zone[:5]) - s.r_robot - s.eps
         reach = min(nearest, (s.v_max + abs(walk)) * time)
-        if h <= reach and not is_across and not is_on_goal:
+        if h <= reach and across <= s.head_on_share * abs(way) * abs(walk):
             nearest, turn = h, _turn_aside(at, way, zone, fixed, s)
     target = complex(*goal) + way * (turn - 1)  # exactly the goal without a turn
     return target.real, target.imag
@@ -586,16 +585,22 @@ def _turn_aside(
     at: complex, way: complex, zone: Sequence[float], fixed: Obstacles, s: MPCSettings
 ) -> complex:
     """By what the `way` is turned, to pass a person with this `zone`."""
-    a, b = complex(*zone[:2]), complex(*zone[2:4])
-    semi_axis = zone[4] + s.r_robot + s.eps
-    center, across = (a + b) / 2 - at, 1j * way / abs(way)
     # complex numbers: the conjugate of u times v has the angle from u to v
+    a, b, margin = complex(*zone[:2]) - at, complex(*zone[2:4]) - at, s.r_robot + s.eps
+    at_goal = ellipse_formula(
+        way.real, way.imag, a.real, a.imag, b.real, b.imag, zone[4]
+    )
+    if not a * b or (at_goal < margin and hypot(*zone[7:9]) < STANDING_SPEED):
+        return 1.0
+    semi_axis = zone[4] + margin  # of the set h < 0
+    cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
+    w = acos(max(-1.0, min(1.0, cosine))) / 2
+    bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
+    across = 1j * way / abs(way)
     width = sqrt(semi_axis**2 - ((a - b).conjugate() * across).imag ** 2 / 4)
-    w = asin(width / max(abs(center), width))
-    bearing = phase(center.conjugate() * way)
     for side in (1, -1) if s.pass_side == "left" else (-1, 1):
-        beside = at + center + side * width * across * _BESIDE
-        lead = side * bearing / (s.head_on_share * w)
+        lead = side * bearing / (s.head_on_share * w) if w else inf
+        beside = at + (a + b) / 2 + side * width * across * _BESIDE
         if -1 <= lead < 2 and (fixed.h(beside.real, beside.imag) >= 0).all():
             return rect(1.0, (side * w - bearing) * min(1.0, 2 - lead))
     return 1.0

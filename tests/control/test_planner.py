@@ -178,7 +178,7 @@ def test_a_zone_that_is_entered_at_its_price_is_reported(name):
     settings = szlib.MPCSettings.among_people(time_limit=np.inf)
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls, settings=settings)
     metrics = szlib.simulate(scenario, controller).metrics()
-        assert metrics["success"] and metrics["min_clearance"] > 0.0
+    assert metrics["success"] and metrics["min_clearance"] > 0.0
     assert metrics["unflagged_violations"] == metrics["unflagged_overlaps"] == 0
 
 
