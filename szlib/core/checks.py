@@ -74,20 +74,20 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     if array.shape[n_free:] != sizes or (n_free and sizes == shape):
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)
-    within = f"finite and within +-{LARGEST:g}, or the origin moved"
-    is_within = np.abs(array).max(initial=0.0) <= LARGEST
-    require(is_within, name, array.tolist(), within, SolverError)
+    require(np.isfinite(array).all(), name, value, "finite", SolverError)
+    if np.abs(array).max(initial=0.0) > LARGEST:
+        raise SolverError(
+            f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin"
+        )
     return array
 
 
 def check_vector(name: str, value: ArrayLike, n: int) -> list[float]:
     """The `n` numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
-    numbers: Any = value
-    if type(numbers) is np.ndarray:
-        numbers = numbers.tolist()
-    is_row = isinstance(numbers, tuple | list) and len(numbers) == n
-    if is_row and all(type(v) is float and abs(v) <= LARGEST for v in numbers):
-        return list(numbers)
+    row: Any = value.tolist() if isinstance(value, np.ndarray) else value
+    is_row = isinstance(row, tuple | list) and len(row) == n
+    if is_row and all(type(v) is float and abs(v) <= LARGEST for v in row):
+        return list(row)
     return list(map(float, check_array(name, value, (n,))))
 
 

@@ -99,8 +99,8 @@ def claim_folder(folder: str | Path, purpose: str) -> Path:
             "empty folder (or remove the results of an older szlib)"
         )
     if owner is None:
-        says = "Written by szlib, which may replace every file here."
-        write_file(folder / MARKER, f"{purpose}\n{says}\n")
+        text = f"{purpose}\nWritten by szlib, which may replace every file here.\n"
+        write_file(folder / MARKER, text)
     elif owner != purpose:
         raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
     return folder
@@ -109,5 +109,5 @@ def claim_folder(folder: str | Path, purpose: str) -> Path:
 def folder_purpose(folder: str | Path) -> str | None:
     """The purpose for which `folder` was claimed, or None."""
     with suppress(OSError, ValueError, IndexError):
-        return read_small(Path(folder) / MARKER).decode("utf-8").splitlines()[0]
+        return read_small(Path(folder) / MARKER).decode().splitlines()[0]
     return None

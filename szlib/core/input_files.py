@@ -168,12 +168,13 @@ def memory_limit() -> int:
 @contextmanager
 def environment(**variables: str) -> Iterator[None]:
     """Set environment variables inside a with block."""
-    before = os.environ.copy()
+    before = {k: v for k, v in os.environ.items() if k in variables}
     os.environ.update(variables)
     try:
         yield
     finally:
-        os.environ.clear()
+        for name in variables:
+            os.environ.pop(name, None)
         os.environ.update(before)
 
 

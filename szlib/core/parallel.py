@@ -11,7 +11,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -61,14 +61,12 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
     with explain_errors(killed, advice, SzlibError, TerminatedWorkerError):
         with safe_path():
             results = workers(tasks)
-        with closing(results):
-            yield from results
+        yield from results
 
 
 def limit_jobs(n_jobs: int, n_tasks: int) -> int:
     """Reduce `n_jobs` to at most `n_tasks`, and to four for each core; -1 is left."""
-    expected = "a number of processes, or -1 for every core"
-    require(n_jobs, "n_jobs", n_jobs, expected)
+    require(n_jobs, "n_jobs", n_jobs, "a number of processes, or -1 for every core")
     return min(n_jobs, _MAX_PER_CORE * (os.cpu_count() or 1), max(n_tasks, 1))
 
 
@@ -97,7 +95,7 @@ def cluster(address: str | None, *, wait: float = 10.0) -> Iterator[Any]:
     SzlibError if no scheduler answers, no worker joins it, or the extra `cluster` is not installed.
     """
     if address is None:
-        yield None
+        yield
         return
     failed = f"no Dask scheduler with a worker answers at {address!r} within {wait:g} s"
     advice = (

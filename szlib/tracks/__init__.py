@@ -4,8 +4,8 @@ recipe        how files are read: `Recipe`, and `Shape`, a kind of files that ha
 sources       files unpacked and recognised; text as columns; large files scanned
 shapes        other files, and tables of libraries, as columns: Parquet, Feather, SQLite, JSON, named shapes
 funnels       how many rows entered each stage, and why others were rejected; whether people can move so
-plausibility  advice where people do not walk: a recipe with which they would; a description with a map
-columns       which column holds what; from columns to rows in seconds and metres
+plausibility  a description of rows, with a map
+columns       which column holds what, and with which columns people would walk; rows in seconds and metres
 readers       rows of files as they are: `read_raw`; several files: pieces of one recording, or separate ones
 clock         rows brought to multiples of 0.1 s, with velocities: `read_tracks`, `to_clock`
 datasets      named data and paths, downloads verified by hash

@@ -217,8 +217,8 @@ def _parse_ewap(file: File) -> ParsedFile:
     far = steps.filter(length > _EWAP_STEP**2)
     along = col.x * col.vx + col.y * col.vy
     median = far.select(along * col.frame / length).to_series().median()
-    rates = np.array([median], float)  # NaN where nobody walks
-    near = [rate for rate in _EWAP_RATES if abs(rates[0] - rate) < _EWAP_ERROR * rate]
+    found = median if isinstance(median, float) else 0.0  # nobody walks
+    near = [rate for rate in _EWAP_RATES if abs(found - rate) < _EWAP_ERROR * rate]
     return source, {"frame_rate": near[0]} if near else {}
 
 
