@@ -351,11 +351,10 @@ class MPCCBF(Controller):
             other = self._planner.plan(question, plan_along(s, state, points))
             plan = min(plan, other, key=lambda each: each.rank)
             plan = plan._replace(timed_out=other.timed_out)
-        braking = plan_braking(s, state[2:])
         if plan.violations == (inf,):
-            return "braking", plan._replace(inputs=braking)
+            return "braking", plan._replace(inputs=plan_braking(s, state[2:]))
         if max(plan.violations, default=0.0) > 0.0 and not plan.timed_out:
-            other = self._planner.plan(question, braking)
+            other = self._planner.plan(question, plan_braking(s, state[2:]))
             if other.rank < plan.rank:
                 return "restarted", other
         is_too_fast = hypot(*state[2:]) > s.v_max + TOLERANCE
@@ -464,9 +463,8 @@ class MPCCBF(Controller):
         is_point: bool = False,
     ) -> Scene:
         """What the step is asked, with the zone of every person; for the disc, or for the planned point."""
-        s, fixed = self.settings, self._fixed_of_disc
-        if is_point:
-            s, fixed = self._s, self._fixed
+        s = self._s if is_point else self.settings
+        fixed = self._fixed if is_point else self._fixed_of_disc
         people, groups = tracked.people, list[Group]()
         found = tuple([self.zone_of(each) for each in people])
         if people:
