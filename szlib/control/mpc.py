@@ -544,14 +544,11 @@ class MPCCBF(Controller):
         """
         scene, limit = self._ask(state, goal, people), self._s.v_max
         *at, vx, vy = scene.state
-        begins = scene.barriers.h(*at), "the run starts in violation:", at, "start"
-        ends = (
-            scene.h_of_goal,
-            "the goal cannot be reached:",
-            scene.goal,
-            "choose a goal",
-        )
-        for h, fault, place, remedy in (begins, ends):
+        at_start, at_goal = scene.barriers.h(*at), scene.h_of_goal
+        for h, fault, place, remedy in (
+            (at_start, "the run starts in violation:", at, "start"),
+            (at_goal, "the goal cannot be reached:", scene.goal, "choose a goal"),
+        ):
             if (h < 0).any():
                 i = int(h.argmin())
                 raise SolverError(

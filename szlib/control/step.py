@@ -319,10 +319,8 @@ class Step:
         return verify_step(self)
 
     def __repr__(self) -> str:
-        safe, control = (
-            "safe" if self.safe else "not safe",
-            self._units.format(*self.control),
-        )
+        safe = "safe" if self.safe else "not safe"
+        control = self._units.format(*self.control)
         found = f"{self.status}, {safe}, control={control}, min h={self.h.min(initial=inf):.3g} m"
         return f"{type(self).__name__}({found})"
 
@@ -352,26 +350,19 @@ class Step:
     def _list_notes(self) -> list[str]:
         """What else has to be known, and what would help."""
         scene, s, worst = self.scene, self.scene.settings, self.violations
-        late = min(s.time_limit, s.deadline)
-        slowest = (
-            scene.name(int(self.residual.min(axis=1).argmin())) if len(self.h) else ""
-        )
-        is_priced = {
-            Priority.DECAY: s.decay_price < inf,
-            Priority.ZONE: s.zone_price < inf,
-        }
-        bought = {
-            each for each in is_priced if is_priced[each] and worst[each] > TOLERANCE
-        }
+        falls = self.residual.min(axis=1)
+        slowest = scene.name(int(falls.argmin())) if len(falls) else ""
+        is_cut = s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE
         notes = {
             f"h of {slowest} falls faster than gamma = {s.gamma:g}, at its price; what helps: a "
-            f"decay_price above {s.decay_price:g}": Priority.DECAY in bought,
+            f"decay_price above {s.decay_price:g}": s.decay_price < inf
+            and worst[Priority.DECAY] > TOLERANCE,
             f"it enters a zone by {worst[Priority.ZONE]:.2g} m, at its price; what helps: a zone_price above "
-            f"{s.zone_price:g}": Priority.ZONE in bought,
+            f"{s.zone_price:g}": is_cut,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
             "v_max": not self.passively_safe,
-            f"time was up after {late} s; what helps: a larger one": self.timed_out,
+            f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one": self.timed_out,
             f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
             "helps: another goal": scene.goal_blocked,
             "walls leave no way to the goal, so the robot goes to the nearest point that it can reach; what "

@@ -105,17 +105,12 @@ class Report:
     faults : each claim that is wrong, as a sentence; empty if all claims hold.
     worst : the row without a price that has the smallest value.
     slack : by how much `worst` is violated, 0 if it is not.
-    h : smallest barrier in the state itself and after the control [m]; inf without any.
-    gap : smallest Euclidean gap of the robot's disc to bodies and everything fixed, or h + eps of a person,
-        at times from now until after the control [m].
     feasible, safe : as `Step.feasible` and `Step.safe`, by these numbers.
     """
 
     faults: tuple[str, ...]
     worst: Row
     slack: float
-    h: float
-    gap: float
     feasible: bool
     safe: bool
 
@@ -150,32 +145,30 @@ def verify_step(step: Any) -> Report:
     solids = scene.solids
     if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
         gap = -np.inf
-    slack, gap = max(0.0, -worst.value), float(min(gap, of_zones))
-    least = float(of_disc[:, [0, -1]].min(initial=np.inf))
-    lowest, feasible = min(least, gap), slack <= TOLERANCE
+    least = of_disc[:, [0, -1]].min(initial=np.inf)
+    lowest, slack = float(min(least, gap, of_zones)), max(0.0, -worst.value)
+    feasible = slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
-    pairs = {
-        "motion": (way.states, x),
-        "motion of the disc": (path[::PIECES], step.predicted[:, :2]),
-        "h": (of_disc[:, 0], step.h),
-        "residual": (residual[:, : s.N_h], step.residual),
-        "slack": (slack, step.slack),
-    }
-    if step.of_point is None:
-        pairs["control"] = step.control, step.inputs[0]
-    errors = {
-        name: np.abs(np.subtract(*pair)).max(initial=0.0)
-        for name, pair in pairs.items()
-    }
-    errors["an acceleration beyond its bound"] = s.dt * (
-        np.abs(step.inputs).max() - s.a_max
-    )
-    tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
-    faults = [
-        f"{name} differs by {each:.2g}"
-        for name, each in errors.items()
-        if not each <= tolerance
+    compared = [
+        ("motion differs", way.states, x),
+        ("motion of the disc differs", path[::PIECES], step.predicted[:, :2]),
+        ("h differs", of_disc[:, 0], step.h),
+        ("residual differs", residual[:, : s.N_h], step.residual),
+        ("slack differs", slack, step.slack),
+        (
+            "an acceleration is beyond its bound",
+            step.inputs.clip(-s.a_max, s.a_max),
+            step.inputs,
+        ),
     ]
+    if step.of_point is None:
+        compared.append(("control differs", step.control, step.inputs[0]))
+    tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
+    faults = list[str]()
+    for name, found, given in compared:
+        error = np.abs(found - given).max(initial=0.0)
+        if not error <= tolerance:
+            faults.append(f"{name} by {error:.2g}")
     undecided = min(abs(slack - TOLERANCE), abs(lowest + TOLERANCE)) <= tolerance
     # the bound of a step may be loose where somebody or the robot is fast
     fastest = max([np.hypot(*each.velocity) for each in scene.people], default=0.0)
@@ -186,7 +179,7 @@ def verify_step(step: Any) -> Report:
             f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
         )
     faults += _check_guard(step, s.dt * lengths)
-    return Report(tuple(faults), worst, slack, least, gap, feasible, safe)
+    return Report(tuple(faults), worst, slack, feasible, safe)
 
 
 def _sample(state: Array, inputs: Array, lasts: Array, rests_by: Any = None) -> Sampled:
