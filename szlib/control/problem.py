@@ -112,10 +112,13 @@ def build_horizon(settings: MPCSettings) -> Horizon:
 
 def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
     """Inputs that bring the robot from `velocity` to rest soonest on its path, within `s`, shape (N, 2)."""
-    times = np.array(s.times)
-    fastest = max(map(abs, velocity)) or 1.0
-    left = np.maximum(1.0 - s.a_max * times / fastest, 0.0)
-    return np.outer(np.diff(left) / np.diff(times), velocity)
+    vx, vy = velocity
+    plan = list[tuple[float, float]]()
+    for dt in (s.dt * length for length in s.step_lengths):
+        time = max(dt, max(abs(vx), abs(vy)) / s.a_max)
+        plan.append((-vx / time, -vy / time))
+        vx, vy = vx - dt * vx / time, vy - dt * vy / time
+    return np.array(plan)
 
 
 def plan_along(s: MPCSettings, state: Sequence[float], points: Array) -> Array:

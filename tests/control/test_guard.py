@@ -105,7 +105,7 @@ def test_no_wall_is_touched_whatever_people_do_and_whatever_a_sensor_says(
     extra = (
         0.35 if name == "wheels" else 0.0
     )  # where the point ahead must be able to stop
-    while driven < 14:
+    while driven < 20:
         world = draw_world(rng, radius + extra)
         if world is None:
             continue
