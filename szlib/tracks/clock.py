@@ -28,7 +28,7 @@ from ..core.errors import DataError
 from ..core.input_files import require, require_memory
 from . import funnels
 from .readers import list_sources, read_raw
-from .recipe import SHORTEST_GAP, Recipe, find_recipe
+from .recipe import SHORTEST_GAP, Recipe, advise, find_recipe
 
 TICKS_PER_SECOND = 10  # the common clock: positions at multiples of 0.1 s
 
@@ -151,7 +151,8 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     if n_lost > _MOST_LOST * len(t) + _FEW:
         raise DataError(
             f"{n_lost:,} of {len(t):,} samples lie in pieces shorter than a step of 0.1 s: "
-            "are times seconds, and ids people?  Else pass time_unit or frame_rate, or a longer max_gap"
+            "are times seconds, and ids people?  Else pass frame_rate, or a longer max_gap, or if times are "
+            f"Excel's days, {advise(time_unit='days')}"
         )
     rejected = {"in a gap-free piece that covers no tick": n_lost}
     stage = funnels.stage("clock: samples", len(t), n_covered, rejected)

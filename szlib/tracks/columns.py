@@ -1,19 +1,17 @@
 """From the columns of a file or table to its rows: t [s], id, x, y [m], as a recipe says.
 
-Columns are found by the names given or by usual names.  Where that fails, the error says with which columns
-people would walk.  Values are converted here, too: numbers, times and ids.
+Columns are found by the names given or by usual names.  Where that fails, the error says which columns there
+are.  Values are converted here, too: numbers, times and ids.
 """
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import permutations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +20,6 @@ from polars import Float64, Int64, Series, String, col, exceptions
 
 from ..core.errors import DataError
 from ..core.input_files import explain_errors
-from .funnels import first_rows, measure_motion, rejection_reason
 from .recipe import DEGREES, NAMES, PIXELS, SHAPES, TIME_UNITS, Recipe, advise
 from .shapes import open_arrow, open_database, open_json, open_shape
 from .sources import CONTAINERS, File, Rows, Source, recognise
@@ -32,10 +29,7 @@ _TIMES = re.compile(r"(time|sec|stamp|frame|zeit|hour|minute)")
 # mean number of rows of a person in a recording, at least, where a column tells recordings apart
 _MIN_ROWS = 5
 _FRAMES = 25.0  # a usual frame rate [1/s], for advice
-_MAX_COLUMNS = 40  # number of columns that are looked at
 _PIXEL = 0.02  # metres in a pixel that an error message shows as an example
-_SAMPLE = 2000  # rows in which columns are guessed
-_MOST = 0.95  # share of them that another reading must be able to use
 
 # Times without a unit whose median is larger count in this unit since 1970: as seconds they would be
 # later than the year 5000.
@@ -93,7 +87,7 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
     a column that may tell recordings apart is such an error, too.
     """
     named, path, decimal = recipe.has_people, source.where, source.decimal
-    recipe = find_columns(source, recipe, ask=ask)
+    recipe = find_columns(source, recipe)
     values = {name: column_of(source, at) for name, at in recipe.columns.items()}
     numbers = {
         name: to_numbers(column, decimal)
@@ -153,10 +147,8 @@ def metres_in_degree(latitude: float) -> tuple[float, float]:
 # --- which column holds what --------------------------------------------------------------------------
 
 
-def find_columns(source: Source, recipe: Recipe, *, ask: bool = True) -> Recipe:
+def find_columns(source: Source, recipe: Recipe) -> Recipe:
     """Complete a `recipe` with the columns of a `source`, and with the units that their names state.
-
-    With `ask` an error proposes columns.
 
     Raises
     ------
@@ -180,10 +172,13 @@ def find_columns(source: Source, recipe: Recipe, *, ask: bool = True) -> Recipe:
         known = ", ".join(repr(name or k) for k, name in enumerate(names[:12]))
         columns = found | dict.fromkeys(missing, "...")
         lacking = ", ".join(str(given.get(name, name)) for name in missing)
-        part = replace(recipe, columns=found)
-        advice = suggest_reading(source, part) if ask else ""
-        advice = advice or f"it has {known}; {advise(columns=columns)}"
-        raise DataError(f"{where} has no column {lacking}; {advice}")
+        guess = ""
+        if not any(names):
+            columns = {name: given.get(name, k) for k, name in enumerate(needed)}
+            guess = "name its format, such as petrack, or its fields; this is only a guess: "
+        raise DataError(
+            f"{where} has no column {lacking}; it has {known}; {guess}{advise(columns=columns)}"
+        )
     stated = {q: _split_unit(name)[1] for q, name in found.items() if name in names}
     units = {NAMES["units"].get(stated.get(name)) for name in "xy"}
     unit = units.pop() if len(units) == 1 else None
@@ -296,64 +291,6 @@ def _candidates(quantity: str, recipe: Recipe, names: Sequence[str]) -> list[str
     return [name for name in names if _split_unit(name)[0] in usual]
 
 
-def suggest_reading(source: Source | None, recipe: Recipe) -> str:
-    """Advice how to read a `source` so that people walk: the first of the usual readings with which they do.
-
-    Columns that the `recipe` names are taken as they are; at last the first ones that vary are tried in any
-    order.  Empty where people walk with none.
-    """
-    if source is None:
-        return ""
-    sample = replace(
-        source, column=lambda k: source.column(k).head(_SAMPLE), ragged=False
-    )
-    usual = [(recipe.columns, change) for change in NAMES["readings"]]
-    for known, change in [*usual, ({}, {})]:
-        is_frame = "frame" in recipe.columns or "frame_rate" in change
-        time = known.get("frame", known.get("t"))
-        columns = {
-            "frame" if is_frame else "t": time,
-            **{name: known.get(name) for name in ("id", "x", "y")},
-        }
-        found = _find_walking(sample, recipe, columns, change)
-        new = {name: v for name, v in change.items() if getattr(recipe, name) is None}
-        if not found.items() <= recipe.columns.items():
-            new = {"columns": found, **new}
-        if found and new:
-            rate = f"{_FRAMES:g} frames a second are only a guess: "
-            guess = rate if "frame_rate" in new else ""
-            return f"people walk if it is read like this: {guess}{advise(**new)}"
-    return ""
-
-
-def _find_walking(
-    source: Source, recipe: Recipe, known: Mapping[str, Any], change: Mapping[str, Any]
-) -> dict[str, Any]:
-    """The `known` columns, completed by others that vary, with which people walk; empty where there are none.
-
-    Of several orders, the one with the smoothest ways is taken, then the one with the most regular times.
-    """
-    missing = [name for name, at in known.items() if at is None]
-    free = [
-        name or k
-        for k, name in enumerate(source.names[:_MAX_COLUMNS])
-        if (name or k) not in known.values() and source.column(k).n_unique() > 1
-    ]
-    found: list[Any] = []
-    for order in permutations(free[: len(missing)], len(missing)):
-        columns = {**known, **dict(zip(missing, order, strict=True))}
-        given = replace(recipe, columns=columns).over(Recipe(**change))
-        with suppress(DataError, exceptions.PolarsError):
-            table = load_rows(source, given, ask=False).table
-            good = table.filter(rejection_reason(table).is_null()).collect()
-            motion = measure_motion(first_rows(good))
-            is_most = good.height > _MOST * len(source.column(0))
-            if is_most and motion and motion.is_walking:
-                scores = round(motion.roughness, 1), round(motion.irregularity, 3)
-                found.append((*scores, len(found), columns))
-    return min(found)[-1] if found else {}
-
-
 # --- values -------------------------------------------------------------------------------------------
 
 
@@ -370,7 +307,7 @@ def to_numbers(values: Series, decimal: str = ".") -> Series:
 def to_times(
     values: Series, tz: str, unit: str | None = None, decimal: str = "."
 ) -> tuple[Series, Series | None]:
-    """The times in a column of `values`: numbers (`decimal` is their point), dates, durations, ISO texts.
+    """The times in a column of `values`: numbers (`decimal` is their point), dates, ISO texts.
 
     Numbers are in a `unit` of time; None takes seconds, or a shorter unit for counts since 1970.  Times
     without a zone are those of `tz`.  Returns seconds, since 1970 where times are dates; and the local date
@@ -386,12 +323,10 @@ def to_times(
         if has_zone.any():
             values = Series(parsed.where(has_zone)).dt.replace_time_zone("UTC")
             day = text.str.slice(0, 10).str.to_date("%Y-%m-%d", strict=False)
-    elif unit == "days" and not values.dtype.is_temporal():
+    elif unit == "days" and values.dtype not in (pl.Date, pl.Datetime):
         ms = ((numbers - _EXCEL_1970) * 86_400_000).round()
         values = ms.cast(Int64, strict=False).cast(pl.Datetime("ms"))
-    if values.dtype == pl.Duration:
-        return values.dt.total_nanoseconds() / 1e9, None
-    if values.dtype.is_temporal() and values.dtype != pl.Time:
+    if values.dtype in (pl.Date, pl.Datetime):
         zone = getattr(values.dtype, "time_zone", None)
         moments = values.cast(pl.Datetime("ns", zone), strict=False)
         if zone is None:

@@ -3,14 +3,13 @@
 A table has its funnel in ``DataFrame.attrs["funnel"]``, which Parquet preserves.  Each stage is a plain dict
 with the keys stage, entered, kept and rejected, so that the funnel stays with the data.
 
-The reasons are here, too: what makes a row unusable, and what people cannot do.  People walk at 1 to 2 m/s,
-are seen every few seconds at the latest, and a site is between a metre and a kilometre wide.
+The reasons are here, too: what makes a row unusable, and what people cannot do.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -20,8 +19,8 @@ import polars as pl
 from numpy.typing import ArrayLike
 from polars import col
 
-from ..core.errors import DataError, SzlibError, warn
-from .recipe import Recipe, advise
+from ..core.errors import DataError, SzlibError
+from .recipe import NAMES, TIME_UNITS, Recipe, advise
 from .sources import Rows
 
 Stages = Sequence[Mapping[str, Any]]
@@ -35,18 +34,10 @@ LAST_SECOND = 4_102_444_800.0
 FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 # number of rows, the first ones, by which the motion of people is judged
 MAX_ROWS = 200_000
-_WIDEST = 1000.0  # widest site of people who certainly walk [m]
 # greatest median and greatest 90 % quantile of the speed of people [m/s]
 _FASTEST = (3.0, 6.0)
-# smallest and greatest 90 % quantile of the speed where people certainly walk [m/s]
-_WALKS = (0.6, 4.0)
-# shortest and longest usual time between two samples of a person [s]
-_STEPS = (0.005, 5.0)
-# greatest roughness of ways; people whose ids are mixed up have 1.4 and more
-_ROUGH = 1.0
+_WALKS = 0.6  # smallest 90 % quantile of the speed where people walk [m/s]
 _MIN_STEPS = 20  # number of steps that allows a judgement
-# greatest interquartile range of the sampling interval, over its median, of a regular clock
-_REGULAR = 0.5
 # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
 _SPRINT, _JUMP = (12.5, 100.0)
 _WALK = 1.2  # a usual walking speed [m/s]
@@ -208,46 +199,28 @@ class Motion(NamedTuple):
     ----------
     median_speed, high_speed : median and 90 % quantile of the speed of people [m/s].
     interval : median time between two samples of a person [s].
-    irregularity : interquartile range of that time, over its median.
-    width : width of the site [m].
-    roughness : median change of the velocity from one second to the next, over the median speed.
     """
 
     median_speed: float
     high_speed: float
     interval: float
-    irregularity: float
-    width: float
-    roughness: float
 
     @property
     def fault(self) -> str:
         """Why people cannot move like this; empty where they can."""
         if self.median_speed > _FASTEST[0] or self.high_speed > _FASTEST[1]:
             return f"people move at {self.median_speed:.3g} m/s (median), expected 0 to {_FASTEST[0]:g}"
-        if self.high_speed < _WALKS[0]:
-            quantiles = f"the median of their speed is {self.median_speed:.2g} m/s, the 90 % quantile"
-            return f"nobody walks: {quantiles} {self.high_speed:.2g} m/s"
+        if self.high_speed < _WALKS:
+            return (
+                f"nobody walks: the median of their speed is {self.median_speed:.2g} m/s, the 90 % quantile "
+                f"{self.high_speed:.2g} m/s"
+            )
         return ""
-
-    @property
-    def is_walking(self) -> bool:
-        """Whether people certainly walk, and are sampled regularly."""
-        return (
-            not self.fault
-            and self.high_speed <= _WALKS[1]
-            and self.irregularity <= _REGULAR
-            and _STEPS[0] <= self.interval <= _STEPS[1]
-            and 1 <= self.width <= _WIDEST
-            and self.roughness < _ROUGH
-        )
 
 
 def measure_motion(rows: np.ndarray) -> Motion | None:
     """How people move in `rows` t [s], id, x, y [m], shape (4, n); None where there are too few steps."""
     rows = rows[:, np.isfinite(rows).all(axis=0)]
-    if rows.shape[1] <= _MIN_STEPS:
-        return None
     rows = rows[:, np.lexsort((rows[0], rows[1]))]
     step, person, *_ = np.diff(rows)
     same, is_later = person == 0, np.diff(np.floor(rows[0])) != 0
@@ -256,20 +229,9 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
     by_second = person == 0
     if by_second.sum() < _MIN_STEPS:
         return None
-    velocity = np.array(moved) / np.where(by_second, duration, np.nan)
-    change = np.hypot(*np.diff(velocity, axis=1))
-    change = change[np.isfinite(change)]
-    median, fast = np.quantile(np.hypot(*velocity)[by_second], [0.5, 0.9])
-    low, usual, high = np.quantile(step[same], [0.25, 0.5, 0.75])
-    irregularity = (high - low) / usual if usual > 0 else np.inf
-    roughness = np.median(change) / median if len(change) and median else 0.0
-    width = _spread(rows[2:])
-    return Motion(*map(float, (median, fast, usual, irregularity, width, roughness)))
-
-
-def _spread(places: np.ndarray) -> float:
-    """The wider side of the rectangle that holds nearly all `places`, shape (2, n)."""
-    return float(np.ptp(np.quantile(places, [0.01, 0.99], axis=1), axis=0).max())
+    speed = np.hypot(*moved)[by_second] / duration[by_second]
+    median, fast = np.quantile(speed, [0.5, 0.9])
+    return Motion(float(median), float(fast), float(np.median(step[same])))
 
 
 def first_rows(rows: pl.DataFrame) -> np.ndarray:
@@ -279,39 +241,44 @@ def first_rows(rows: pl.DataFrame) -> np.ndarray:
     return first.to_numpy().astype(float).T
 
 
-def check_people(
-    rows: Rows, good: pl.DataFrame, given: Recipe, suggest: Callable[[], str]
-) -> None:
-    """Raise DataError where people cannot move like this; suggest another reading.
+def check_people(rows: Rows, good: pl.DataFrame, given: Recipe) -> None:
+    """Raise DataError where people cannot move like this, and would with another unit, or are too fast.
 
-    Where the user has given the unit, the motion gives a DataWarning instead.  People who do not walk may all
-    be standing: that is an error only where another reading makes them walk.
+    Where the unit is certain, or the user has given it, nothing is raised.
 
     Parameters
     ----------
     rows : the file, and how it was read.
     good : its usable rows t [s], id, x, y [m].
     given : the recipe that the user gave.
-    suggest : a function that gives advice how to read the file.
     """
-    seen, is_given, recipe = first_rows(good), given.has_metres, rows.recipe
-    if not recipe.shape.is_sure:
-        found, fault = measure_motion(seen), "people are seen too briefly"
-        if found is not None:
-            is_irregular = found.irregularity > _REGULAR
-            irregular = "people are seen at irregular times" if is_irregular else ""
-            fault = found.fault or irregular
-        advice = suggest() if fault else ""
-        message = "; ".join(filter(None, [f"{rows.path}: {fault}", advice]))
-        if is_given and advice:
-            warn(message)
-        elif not is_given and (advice or (found and found.high_speed > _FASTEST[1])):
-            if found and found.median_speed > _FASTEST[0]:
-                scale = advise(scale=float(f"{_WALK / found.median_speed:.2g}"))
-                message += f"; if they are pixels in which people walk at {_WALK:g} m/s, {scale}"
-            raise DataError(
-                f"{message}; if people do move like that, {advise(unit='m')}"
-            )
+    found, recipe = measure_motion(first_rows(good)), rows.recipe
+    is_certain = recipe.shape.is_sure or given.has_metres
+    if is_certain or found is None or not found.fault:
+        return
+    advice = _find_unit(recipe, found.high_speed)
+    if not advice and found.high_speed > _FASTEST[1]:
+        scale = advise(scale=float(f"{_WALK / found.median_speed:.2g}"))
+        advice = f"if they are pixels in which people walk at {_WALK:g} m/s, {scale}"
+    if advice:
+        raise DataError(
+            f"{rows.path}: {found.fault}; {advice}; if people do move like that, {advise(unit='m')}"
+        )
+
+
+def _find_unit(recipe: Recipe, speed: float) -> str:
+    """Advice how to complete a `recipe` so that the high `speed` of people is that of walking."""
+    for change in NAMES["changes"]:
+        new = Recipe(**change)
+        factor = new.metres / TIME_UNITS[new.time_unit or "s"] * (new.frame_rate or 1)
+        is_known = change.keys() & recipe.as_json()
+        if is_known or not _WALKS < factor * speed < _FASTEST[0]:
+            continue
+        if new.time_unit or new.unit:
+            return f"people walk if it is read like this: {advise(**change)}"
+        columns = {"frame" if k == "t" else k: v for k, v in recipe.columns.items()}
+        return f"if its times are frames, this is only a guess: {advise(columns=columns, **change)}"
+    return ""
 
 
 def find_implausible(rows: pl.DataFrame) -> list[str]:

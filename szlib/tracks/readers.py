@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +21,7 @@ from polars import Expr, LazyFrame, Series, String, col, exceptions, lit
 from ..core.errors import DataError, warn
 from ..core.input_files import explain_errors, printable
 from . import funnels
-from .columns import column_of, load_rows, open_source, suggest_reading
+from .columns import column_of, load_rows, open_source
 from .funnels import check_people, find_implausible, rejection_reason
 from .plausibility import describe_rows
 from .recipe import SHAPES, Recipe, advise, find_recipe
@@ -224,23 +223,20 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
     marked = table.with_columns(reason=rejection_reason(table))
     bad = marked.filter(col.reason.is_not_null())
     good = marked.filter(col.reason.is_null())
-    suggest = partial(suggest_reading, rows.source, recipe)
-    reasons = _count_rejected(rows, bad, table.height, suggest)
+    reasons = _count_rejected(rows, bad, table.height)
     if good.height == 0:
         raise DataError(f"{path}: holds no row; {EXPECTED}")
     rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
     name = f"read {path.name}{rate}"
     stage = funnels.stage(name, table.height, good.height, reasons)
-    check_people(rows, good, given, suggest)
+    check_people(rows, good, given)
     dates = good.get_column("day", default=local_dates(good["t"], recipe))
     day = lit(file_stem(path)) if dates is None else dates
     good = good.select(day.alias("day"), "id", "t", "x", "y")
     return LoadedFile(path, recipe, good, dates is None, stage)
 
 
-def _count_rejected(
-    rows: Rows, bad: pl.DataFrame, n: int, suggest: Callable[[], str]
-) -> dict[str, int]:
+def _count_rejected(rows: Rows, bad: pl.DataFrame, n: int) -> dict[str, int]:
     """Count the `bad` ones of `n` rows by reason, and warn; raise DataError above `Recipe.max_rejected`."""
     reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     if not reasons:
@@ -259,8 +255,6 @@ def _count_rejected(
     if n_bad < n:
         share = ceil(100 * n_bad / n) / 100
         advice = f"if the others are right: {advise(max_rejected=share)}"
-    if 2 * n_bad > n and not recipe.shape.is_sure:
-        advice = suggest() or advice
     raise DataError(
         f"{rows.path}, line {line}: {reason}{held}; {n_bad} of {n} rows cannot be used as "
         f"{recipe.file_format}; {advice}"

@@ -204,21 +204,18 @@ def open_database(file: File) -> list[Source]:
 
 
 def _parse_ewap(file: File) -> ParsedFile:
-    """EWAP counts frames: their rate follows from the displacement in a frame, and the velocity."""
+    """EWAP counts frames: their rate follows from the distance walked in a frame, and the speed."""
     source = open_text(file, has_header=False)
     columns = {"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
     texts = pl.DataFrame({name: source.column(k) for name, k in columns.items()})
     rows = texts.cast(pl.Float64, strict=False).sort("id", "frame")
-    steps = rows.select(
-        col("frame", "x", "y").diff().over("id"),
-        col("vx", "vy").rolling_mean(2).over("id"),
+    steps = rows.select(col("frame", "x", "y").diff().over("id"), "vx", "vy")
+    length, speed = (
+        (col(a) ** 2 + col(b) ** 2).sqrt() for a, b in (("x", "y"), ("vx", "vy"))
     )
-    length = col.x**2 + col.y**2
-    far = steps.filter(length > _EWAP_STEP**2)
-    along = col.x * col.vx + col.y * col.vy
-    median = far.select(along * col.frame / length).to_series().median()
-    found = median if isinstance(median, float) else 0.0  # nobody walks
-    near = [rate for rate in _EWAP_RATES if abs(found - rate) < _EWAP_ERROR * rate]
+    rates = steps.filter(length > _EWAP_STEP).select(speed * col.frame / length)
+    median = rates.to_series().median() or 0.0
+    near = [each for each in _EWAP_RATES if abs(median / each - 1) < _EWAP_ERROR]
     return source, {"frame_rate": near[0]} if near else {}
 
 

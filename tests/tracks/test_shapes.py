@@ -204,7 +204,8 @@ def test_a_shape_is_read_by_what_its_error_proposes_and_saved(
 ) -> None:
     """The second command at the latest reads it; every guess in it is called a guess, and right here."""
     path = SHAPES[name](tmp_path)
-    command = ["inspect", str(path), *AREA, "--save"]
+    named = ["--format", "petrack"] if name == "PeTrack" else []
+    command = ["inspect", str(path), *AREA, *named, "--save"]
     for _ in range(2):
         monkeypatch.setenv(COMMAND_VARIABLE, shlex.join(["szlib", *command]))
         if main(command) == 0:
