@@ -253,8 +253,7 @@ def check_people(rows: Rows, good: pl.DataFrame, given: Recipe) -> None:
     given : the recipe that the user gave.
     """
     found, recipe = measure_motion(first_rows(good)), rows.recipe
-    is_certain = recipe.shape.is_sure or given.has_metres
-    if is_certain or found is None or not found.fault:
+    if recipe.shape.is_sure or given.has_metres or not (found and found.fault):
         return
     advice = _find_unit(recipe, found.high_speed)
     if not advice and found.high_speed > _FASTEST[1]:

@@ -208,13 +208,13 @@ def _parse_ewap(file: File) -> ParsedFile:
     source = open_text(file, has_header=False)
     columns = {"frame": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
     texts = pl.DataFrame({name: source.column(k) for name, k in columns.items()})
-    rows = texts.cast(pl.Float64, strict=False).sort("id", "frame")
-    steps = rows.select(col("frame", "x", "y").diff().over("id"), "vx", "vy")
+    steps = texts.cast(pl.Float64, strict=False).sort("id", "frame")
+    steps = steps.select(col("frame", "x", "y").diff().over("id"), "vx", "vy")
     length, speed = (
         (col(a) ** 2 + col(b) ** 2).sqrt() for a, b in (("x", "y"), ("vx", "vy"))
     )
     rates = steps.filter(length > _EWAP_STEP).select(speed * col.frame / length)
-    median = rates.to_series().median() or 0.0
+    median = rates.to_series().quantile(0.5) or 0.0
     near = [each for each in _EWAP_RATES if abs(median / each - 1) < _EWAP_ERROR]
     return source, {"frame_rate": near[0]} if near else {}
 
