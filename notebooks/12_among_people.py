@@ -336,7 +336,7 @@ for keep in (0.0, ways.SWITCH_GAIN):
     with patch.object(ways, "SWITCH_GAIN", keep):
         robot, sides[keep] = szlib.MPCCBF(zone, settings=among), []
         for t in instants.tolist():
-            person = szlib.Person((3.0, -0.9 + 0.3 * np.sin(2 * np.pi * t / 3)), heading=np.pi)
+            person = szlib.Person((3.0, -0.4 + 0.3 * np.sin(2 * np.pi * t / 3)), heading=np.pi)
             points = robot.step((0.0, 0, 0, 0), (8.0, 0.0), [person]).ways[0].points
             sides[keep].append(float(np.interp(3.0, points[:, 0], points[:, 1])) > person.position[1])
 changes = {keep: int(np.abs(np.diff(each)).sum()) for keep, each in sides.items()}
