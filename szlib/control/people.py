@@ -454,7 +454,7 @@ class Tracker:
 
 
 def check_finite(name: str, value: Any, least: float = -1e300) -> float:
-    """A `value` as a Python float; SolverError if it is no finite number, or below the `least`."""
+    """A `value` as a float; SolverError, with its `name`, if it is not finite, or below the `least`."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):

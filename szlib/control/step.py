@@ -72,7 +72,7 @@ class Scene(NamedTuple):
         return find_bodies(self.zones, self.settings)
 
     def find_standing_h(self, x: Any, y: Any) -> Array:
-        """Barriers at places, shape (obstacles, ...) [m]; inf for people who walk: they leave it free."""
+        """Barriers at `x`, `y`, shape (obstacles, ...) [m]; inf for people who walk: they leave it free."""
         h = self.barriers.h(x, y)
         walk = [hypot(*each.velocity) >= STANDING_SPEED for each in self.people]
         h[: len(walk)][walk] = inf

@@ -67,7 +67,7 @@ class Rows(NamedTuple):
 
 
 def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
-    """The rows of every level at the states `x` of a plan, shape (N+1, 4).
+    """The rows of every level at the states `x` of a plan for a `scene`, shape (N+1, 4).
 
     `h` are the barriers there, and `gaps` those to bodies less `body_gap`, shape (n, N+1) each [m].
     """

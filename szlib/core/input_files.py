@@ -167,7 +167,7 @@ def memory_limit() -> int:
 
 @contextmanager
 def environment(**variables: str) -> Iterator[None]:
-    """Set environment variables inside a with block."""
+    """Set the environment `variables` inside a with block."""
     before = {k: v for k, v in os.environ.items() if k in variables}
     os.environ.update(variables)
     try:

@@ -239,8 +239,8 @@ def test_danger_and_goals_that_cannot_be_reached_are_said_in_words():
     world.change(people={0: {"position": [x + 1.2, y]}})
     reasons = explain(world.steps[0])
     assert reasons.safety == "Not safe: the robot is already too close to person 0."
-    world = make_world("making_room", robots=[AMONG_PEOPLE])
-    said = [sentence(advance(world, 1)) for _ in range(40)]
+    world = make_world("corridor", robots=[AMONG_PEOPLE])
+    said = [sentence(advance(world, 1)) for _ in range(60)]
     assert any("it comes nearer to person" in each for each in said)
     fast = make_world(robots=[FAST])
     while fast.steps[0].feasible:
