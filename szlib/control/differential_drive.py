@@ -210,8 +210,8 @@ class DifferentialDrive(MPCCBF):
     ----------
     zone : as of `MPCCBF`.
     given : walls, obstacles and tracker, as of `MPCCBF`, and `settings` of the robot: `r_robot` its
-        radius about the middle of the axle, `v_max` the limit of |v|; `a_max` bounds the acceleration of the point
-        ahead of the axle. An attribute as well.
+        radius about the middle of the axle, `v_max` the limit of |v|; `a_max` bounds the
+        acceleration of the point ahead of the axle. An attribute as well.
     omega_max : limit of |omega| [rad/s]; default: that of a common indoor robot whose wheels reach 1 m/s
         (assumed).
     ahead : distance of the point from the axle [m]; default: the smallest one with which `settings.v_max` can
