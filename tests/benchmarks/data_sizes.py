@@ -130,7 +130,7 @@ def raw_day() -> Iterator[Path]:
                 plaza.lazy().with_columns(
                     column_1=pl.col("column_1") + shift * copy / copies,
                     column_2=pl.col("column_2") + people * copy,
-                    column_3=pl.col("column_3") + 37.0 * (copy - copies / 2),
+                    column_3=pl.col("column_3") + 37_000.0 * (copy - copies / 2),
                 )
                 for copy in range(copies)
             ]
