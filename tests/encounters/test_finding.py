@@ -73,7 +73,7 @@ def search(
     )
     side = space.width / 2
     people = {}  # (day, id): ticks
-    scene = {}  # (day, tick): who is where
+    scene = {}  # by day and tick: the people and their places
     for row in tracks.itertuples():
         tick = round(row.t * 10)
         people.setdefault((str(row.day), row.id), []).append(tick)
