@@ -37,7 +37,7 @@ MAX_ROWS = 200_000
 # greatest median and greatest 90 % quantile of the speed of people [m/s]
 _FASTEST = (3.0, 6.0)
 _WALKS = 0.6  # smallest 90 % quantile of the speed where people walk [m/s]
-_MIN_STEPS = 20  # number of steps that allows a judgement
+_MIN_STEPS = 10  # number of steps that allows a judgement
 # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
 _SPRINT, _JUMP = (12.5, 100.0)
 _WALK = 1.2  # a usual walking speed [m/s]
