@@ -24,7 +24,7 @@ from .errors import DataError, MemoryLimitError, SzlibError
 # Zero-width letters of Persian, Hindi and emoji, which Python calls not printable.
 _JOINERS = "\u200c\u200d"
 # what differs after a file has changed
-_STATE = attrgetter("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
+_STATE = attrgetter("st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
 
 # Environment variable: the limit of each process, such as 4GB; ``--memory`` of the command line sets it.
 MEMORY_VARIABLE = "SZLIB_MEMORY"
@@ -110,16 +110,16 @@ def read_small(path: Path, largest: int = 10_000_000) -> bytes:
 @contextmanager
 def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
     """Raise DataError where one of the files `paths` has changed when the block ends, or cannot be found."""
-    before = {path: _find_state(path) for path in paths}
+    before = {path: file_state(path) for path in paths}
     yield
     for path, state in before.items():
-        if _find_state(path) != state:
+        if file_state(path) != state:
             raise DataError(
                 f"{printable(path)}: changed while it was read; try again when it is complete"
             )
 
 
-def _find_state(path: Path) -> Any:
+def file_state(path: Path) -> Any:
     """Device, inode, size and times of the file `path`."""
     with opening(path):
         return _STATE(path.stat())

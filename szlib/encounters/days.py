@@ -3,7 +3,8 @@
 In the folder `out` each day has two files: ``<day>.parquet``, its samples and their funnel, and then
 ``<day>.parquet.json``, their checksum and what they are made of: the content of the day's files, every
 parameter, and the version of szlib.  Each file is written atomically.  A day whose two files match is not
-computed again, so a run that was stopped or killed continues where it ended.
+computed again, so a run that was stopped or killed continues where it ended.  Then a file of the same inode,
+size and times is not even read.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from ..core.errors import DataError, DataWarning, SzlibError
 from ..core.files import claim_folder, folder_purpose, load_cached, store_cached
 from ..core.input_files import (
     file_content,
+    file_state,
     printable,
     read_small,
     reading,
@@ -57,7 +59,7 @@ _ADVICE = {
     "": "more data, or other conditions (szlib.find_encounters)",
 }
 # of the cached result of a day; a result of another version is computed again
-_VERSION = 10
+_VERSION = 11
 # purpose of an extraction's folder, as its marker states it
 PURPOSE = "encounters by day"
 # a row of the table of days, of an excluded one
@@ -74,16 +76,15 @@ _ROW: dict[str, Any] = {
 }
 
 
-def read_for_encounters(
+def read_near(
     files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
 ) -> pd.DataFrame:
-    """The tracks on which encounters in the `files` of one day depend.
+    """The rows on which encounters in the `files` of one day depend, for `to_clock`.
 
     `settings` say what counts as an encounter, `recipe` how the files are read.  `szlib.find_encounters`
     finds the same encounters in them as in ``szlib.read_tracks(files)``.
     """
-    raw = read_raw(files, recipe=recipe, select=partial(select_near, settings))
-    return to_clock(raw, max_gap=recipe.max_gap)
+    return read_raw(files, recipe=recipe, select=partial(select_near, settings))
 
 
 def find_area(
@@ -126,18 +127,40 @@ def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
 
 
 def describe_source(
-    files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
+    files: Sequence[Path],
+    settings: EncounterSettings,
+    recipe: Recipe,
+    known: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """What the encounters of a day are made of, in JSON values.
 
-    It holds names, sizes and checksums of the `files`, `settings`, `recipe`, and the version of szlib.
+    It holds names, sizes and checksums of the `files`, their states, `settings`, `recipe`, and the version of
+    szlib.  Checksums are taken from an earlier description, `known`, if the states are the same.
     """
+    states = find_states(files)
+    if known and known.get("states") == states:
+        content = known["files"]
+    else:
+        content = sorted([file.name, *file_content(file)] for file in files)
     return {
         "version": _VERSION,
         "szlib": __version__,
-        "files": sorted([file.name, *file_content(file)] for file in files),
+        "files": content,
+        "states": states,
         "parameters": settings.as_json() | {"recipe": recipe.as_json()},
     }
+
+
+def find_states(files: Sequence[Path]) -> list[list[Any]]:
+    """Name, inode, size and times of each of the `files`, which differ after it has changed."""
+    return sorted([file.name, *file_state(file)] for file in files)
+
+
+def load_source(folder: Path, day: str) -> dict[str, Any] | None:
+    """What the result of a `day` in `folder` is made of; None if there is none, or it is damaged."""
+    with suppress(OSError, LookupError, TypeError, ValueError):
+        return dict(json.loads(read_small(folder / f"{day}.parquet.json"))["made_of"])
+    return None
 
 
 def load_day(folder: Path, day: str, source: Mapping[str, Any]) -> pd.DataFrame | None:
@@ -219,7 +242,8 @@ class Extraction:
                 space = AttentionalSpace(**parameters.pop("space"))
                 settings = EncounterSettings(space=space, **parameters)
             first = next(iter(sources))
-            if sources[day] | {"files": None} != sources[first] | {"files": None}:
+            own = {"files": None, "states": None}
+            if sources[day] | own != sources[first] | own:
                 raise DataError(
                     f"{folder}: {day} was extracted with other settings than {first}, or another version; "
                     "extract all days again, or exclude it"
@@ -333,20 +357,19 @@ def extract_days(
     files = sorted({file.resolve() for file in datasets.find(paths)})
     recipe = find_recipe(files, recipe, **of_recipe)
     folder = claim_folder(out, PURPOSE)
-    days: dict[str, list[Path]] = {}
+    days: dict[str, dict[Path, Any]] = {}
     for file, name in zip(files, name_recordings(files), strict=True):
-        days.setdefault(find_day(file, recipe) or printable(name), []).append(file)
+        [state] = find_states([file])
+        day = find_day(file, recipe) or printable(name)
+        days.setdefault(day, {})[file] = state
     included = {day: days[day] for day in sorted(days.keys() - excluded)}
     shared = [day for day in included if has_calendar(day) or len(included) == 1]
     common = settings
-    contents = {}
     for day in shared:
         # the first day with an area; computing a day that fails says why
-        with suppress(SzlibError), unchanged_files(included[day]):
-            area = find_area(included[day], settings, recipe)
+        with suppress(SzlibError):
+            area = find_area([*included[day]], settings, recipe)
             common = replace(settings, area=area)
-            if area.reason:
-                contents[day] = describe_source(included[day], common, recipe)
             break
     tasks = [
         joblib.delayed(extract_day)(
@@ -355,7 +378,6 @@ def extract_days(
             folder.resolve(),
             common if day in shared else settings,
             recipe,
-            contents.get(day),
         )
         for day in included
     ]
@@ -373,40 +395,44 @@ def extract_days(
 
 def extract_day(
     day: str,
-    files: Sequence[Path],
+    states: Mapping[Path, Any],
     out: Path,
     settings: EncounterSettings,
     recipe: Recipe,
-    expected: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Compute one `day` from its `files`, or load it from the folder `out`; return its row of the table.
+    """Compute one `day`, or load it from the folder `out`; return its row of the table.
 
-    `settings` and `recipe` as in `extract_days`.  The files must begin on this day, and be those of the
-    `expected` source, in which the area was found, if it is given.  Days share nothing but `out`.
+    `states` has the files of the day, and their states before the day and the area were found; they must be
+    the same now.  `settings` and `recipe` as in `extract_days`.  Days share nothing but `out`.
     """
     start = time.perf_counter()
+    files = list(states)
     row = _ROW | {"day": day, "status": "failed", "files": len(files)}
     try:
-        # Checksums are computed while the files are read.
         with unchanged_files(files), ThreadPoolExecutor(1) as thread:
-            described = thread.submit(describe_source, files, settings, recipe)
-            samples = None
-            status = "kept"
-            if (out / f"{day}.parquet").is_file():
-                samples = load_day(out, day, described.result())
-            if samples is None:
-                status = "done"
+            if find_states(files) != sorted(states.values()):
+                raise DataError(
+                    f"{files[0]}: changed after its day or the area was found; extract the day again"
+                )
+            source = samples = None
+            stored = load_source(out, day)
+            if stored:
+                source = describe_source(files, settings, recipe, stored)
+                kept = source | {"states": stored.get("states")}
+                samples = load_day(out, day, kept)
+            status = "done" if samples is None else "kept"
+            if status == "done":
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
-                    tracks = read_for_encounters(files, settings, recipe)
+                    rows = read_near(files, settings, recipe)
+                    # Checksums are computed meanwhile.
+                    described = thread.submit(
+                        describe_source, files, settings, recipe, source
+                    )
+                    tracks = to_clock(rows, max_gap=recipe.max_gap)
                     samples = find_encounters(tracks, settings=settings)
-            begins = {find_day(file, recipe) or day for file in files}
-        source = described.result()
-        if begins != {day} or expected not in (None, source):
-            raise DataError(
-                f"{files[0]}: changed after its day or the area was found; extract the day again"
-            )
-        if status == "done":
+                source = described.result()
+        if status == "done" or source != stored:
             content = samples.to_parquet(index=False)
             store_cached(out / f"{day}.parquet", content, source)
         read = _add_stages([samples])[0]

@@ -15,7 +15,6 @@ Every window is one encounter of 31 samples.  All rows are computed at once, in 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import ceil
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ import polars as pl
 
 from ..tracks import funnels
 from ..tracks.clock import VELOCITY_SPAN
+from ..tracks.readers import sort_rows
 from .areas import AUTO, area_for, as_area, place_apart
 from .geometry import Area
 from .kinds import REACH, kinds_of_pairs, of_kind
@@ -211,7 +211,9 @@ def select_near(
     area: object,
     max_gap: float | None,
 ) -> pl.DataFrame:
-    """Select the rows on which encounters can depend; all where nobody comes near, or the area is unknown.
+    """Select the rows on which encounters can depend, and sort them.
+
+    All rows are selected where the area or the longest gap is unknown, or nobody comes near.
 
     Parameters
     ----------
@@ -224,47 +226,38 @@ def select_near(
     -----
     A raw day has 15 million rows, most of them far from the area. `szlib.find_encounters` finds the same
     encounters in the selected rows as in all rows, bit for bit. The proof uses these terms: g is the longest
-    gap [s] within a track; 0.1 s is the step of the clock; "the rectangle" is the smallest one along the axes
-    around the area, grown by the 5 m in which kinds of encounter are decided.
+    gap [s] within a track; "the rectangle" is the smallest one along the axes around the area, grown by the
+    5 m in which kinds of encounter are decided. A person comes near at time F: until then all rows are
+    beyond one edge of the rectangle, and F is the latest such time of its four edges. In the same way L is
+    the time after which all rows are beyond one edge.
 
-    1. Time is cut into cells of w > g seconds for each person. Only whole cells are dropped. Take two
-       selected rows that follow each other, at most g apart. No dropped row lies between them,
-       because a dropped cell between them would be longer than g. So `to_clock` interpolates between the same
-       two rows as in the whole day: no tick is new, and no tick has moved.
-    2. A tick inside the rectangle lies between two rows at most g apart, in one cell or in two successive
-       cells. If all rows of both cells were on the outer side of one of the rectangle's four edges, the tick
-       would be too. So a tick can be inside only where this holds for no edge. No speed is assumed.
-    3. Of the rows outside the rectangle `find_encounters` uses these only: rows of a person who is inside,
-       from 0.5 s before (velocity of the reference pedestrian) to the end of the window of 3 s after (both
-       people are tracked, and the other person is sampled), and g further to interpolate. All cells within
-       this reach of a cell that can have a tick inside are selected. (Kinds need only ticks inside and their
-       velocities.)
+    1. A tick of the clock lies between two rows at most g apart. If both are before F, both are beyond the
+       same edge, and the tick is too. So ticks inside lie from F - g to L + g. No speed is assumed.
+    2. Of the rows outside the rectangle `find_encounters` uses these only: rows of a person who is inside,
+       from 0.5 s before (velocity of the reference pedestrian) to 0.5 s after the end of a window of 3 s
+       (both people are tracked, and the other person is sampled), and g further to interpolate. All these
+       rows are selected. (Kinds need only ticks inside and their velocities.)
+    3. All rows of a person from the first selected one to the last are selected. So `to_clock` interpolates
+       between the same two rows as in the whole day: no tick is new, and no tick has moved.
     """
     area = area if settings.area is None else settings.area
     if max_gap is None or area in (None, AUTO):
-        return rows
-    around = as_area(area).grown(REACH + _POSITION_ROUNDING)
-    width = max_gap + _TIME_ROUNDING
-    before = ceil(VELOCITY_SPAN / width) + 1
-    after = max(before, ceil(settings.duration / width) + 1)
-    cell = pl.col("cell")
-    keys = ["day", "id", "cell"]
-    all_rows = rows.lazy().with_columns(cell=(pl.col("t") / width).floor())
-    cells = all_rows.group_by(keys).agg(
-        pl.min("x", "y").name.prefix("low_"), pl.max("x", "y").name.prefix("high_")
+        return sort_rows(rows)
+    box = as_area(area).grown(REACH + _POSITION_ROUNDING)
+    t, x, y = map(pl.col, "txy")
+    # on the inner side of each edge
+    inner = [x >= box.x[0], x <= box.x[1], y >= box.y[0], y <= box.y[1]]
+    times = [pl.when(is_inner).then(t) for is_inner in inner]
+    margin = 2 * max_gap + VELOCITY_SPAN + _TIME_ROUNDING
+    begin = pl.max_horizontal(time.min() for time in times) - margin
+    end = pl.min_horizontal(time.max() for time in times) + margin + settings.duration
+    people = rows.lazy().group_by("day", "id")
+    near_people = people.having([is_inner.any() for is_inner in inner])
+    near = (
+        rows.lazy()
+        .join(near_people.agg(begin=begin, end=end), ["day", "id"])
+        .filter(t.is_between("begin", "end"))
+        .select(rows.columns)
+        .collect()
     )
-    inside = (  # of two successive cells, the first
-        pl.concat([cells, cells.with_columns(cell - 1)])
-        .group_by(keys)
-        .having(
-            pl.max("high_x") >= around.x[0],
-            pl.min("low_x") <= around.x[1],
-            pl.max("high_y") >= around.y[0],
-            pl.min("low_y") <= around.y[1],
-        )
-        .agg()
-    )
-    needed = [inside.with_columns(cell + k) for k in range(-before, after + 2)]
-    near = all_rows.join(pl.concat(needed), keys, "semi", maintain_order="left")
-    found = near.drop("cell").collect()
-    return found if found.height else rows
+    return sort_rows(near if near.height else rows)

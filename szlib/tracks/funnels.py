@@ -252,8 +252,10 @@ def check_people(rows: Rows, good: pl.DataFrame, given: Recipe) -> None:
     good : its usable rows t [s], id, x, y [m].
     given : the recipe that the user gave.
     """
-    found, recipe = measure_motion(first_rows(good)), rows.recipe
-    if recipe.shape.is_sure or given.has_metres or not (found and found.fault):
+    recipe = rows.recipe
+    is_certain = recipe.shape.is_sure or given.has_metres
+    found = None if is_certain else measure_motion(first_rows(good))
+    if not (found and found.fault):
         return
     advice = _find_unit(recipe, found.high_speed)
     if not advice and found.high_speed > _FASTEST[1]:

@@ -310,21 +310,21 @@ def scan_streamed(file: File) -> Rows | None:
     """Scan a `file` if its shape is streamed and its recipe simple; None for any other."""
     recipe = file.recipe
     shape = recognise(file.head, file.path, recipe)
-    is_simple = not _NOT_STREAMED & recipe.as_json().keys()
-    if not (shape.is_streamed and is_simple) or file.head.startswith(CONTAINERS):
+    is_whole = not shape.is_streamed or file.head.startswith(CONTAINERS)
+    if is_whole or _NOT_STREAMED & recipe.as_json().keys():
         return None
     recipe = replace(recipe.over(shape.recipe), file_format=shape.name)
     types: dict[Any, Any] = dict.fromkeys(recipe.columns.values(), Float64)
     types[recipe.columns["id"]] = pl.Int64
     schema = {f"f{k}": types.get(k, String) for k in range(shape.n_fields)}
+    content = file.plain if file.size is None else io.StringIO(file.text())
     scan = pl.scan_csv(
-        file.plain, schema={**schema, "extra": String()}, has_header=False, quote_char=None,
+        content, schema={**schema, "extra": String()}, has_header=False, quote_char=None,
         encoding="utf8-lossy", ignore_errors=True, truncate_ragged_lines=True, missing_columns="insert",
         extra_columns="ignore", raise_if_empty=False, glob=False, row_index_name="line", row_index_offset=1,
     )  # fmt: skip
     ragged = col("extra").is_not_null() | col(f"f{shape.n_fields - 1}").is_null()
     named = {name: col(f"f{at}") for name, at in recipe.columns.items()}
     table = scan.select("line", ragged=ragged, **named)
-    metres = col("^(x|y|speed)$") * recipe.metres
-    n_bytes = file.plain.stat().st_size
-    return Rows(file.path, recipe, table.with_columns(metres), n_bytes=n_bytes)
+    table = table.with_columns(col("^(x|y|speed)$") * recipe.metres)
+    return Rows(file.path, recipe, table, n_bytes=file.plain.stat().st_size)

@@ -230,9 +230,9 @@ def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
     from .. import EncounterSettings, find_encounters
-    from ..encounters.days import read_for_encounters
+    from ..encounters.days import read_near
     from ..encounters.finding import find_place
-    from ..tracks import datasets, funnels
+    from ..tracks import datasets, funnels, to_clock
     from ..tracks.readers import describe_file
     from ..tracks.recipe import COMMAND_VARIABLE, FILE_NAME
 
@@ -247,7 +247,8 @@ def _inspect(options: argparse.Namespace) -> int:
     print(description)
     # The funnel shows the same counts.
     with warnings.catch_warnings(action="ignore", category=DataWarning):
-        tracks = read_for_encounters(files, settings, reading)
+        rows = read_near(files, settings, reading)
+        tracks = to_clock(rows, max_gap=reading.max_gap)
         tracks, area = find_place(tracks, settings)
         samples = find_encounters(tracks, settings=replace(settings, area=area))
     print(f"area {area}")

@@ -8,7 +8,6 @@ import resource
 import signal
 import subprocess
 import sys
-import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
@@ -128,6 +127,20 @@ def test_finished_days_are_kept_and_changed_days_computed_again(days, tmp_path):
     assert record["made_of"]["parameters"]["min_speed"] == 0.4
 
 
+def test_files_of_finished_days_are_not_read_again(days, tmp_path, monkeypatch):
+    copy = tmp_path / days[0].name
+    copy.write_bytes(days[0].read_bytes())
+    extract(copy, tmp_path / "out")
+    os.utime(copy)
+    assert list(extract(copy, tmp_path / "out").table["status"]) == ["kept"]
+    monkeypatch.setattr(extraction, "file_content", None)
+    assert list(extract(copy, tmp_path / "out").table["status"]) == ["kept"]
+    copy.rename(tmp_path / "away")
+    copy.write_bytes((tmp_path / "away").read_bytes())
+    again = extract(copy, tmp_path / "out")
+    assert list(again.table["status"]) == ["failed"], "another file is read"
+
+
 @contextmanager
 def other_file(file):
     """Replace `file` by its namesake in the folder "other", and put it back."""
@@ -157,25 +170,16 @@ def test_rows_are_of_the_bytes_of_their_checksum(
     tmp_path,
     monkeypatch,
 ):
-    """The file is another one from the moment that its checksum is known until its rows are read."""
+    """The file is another one while its rows are read, not while its checksum is computed."""
     for name, day in (("data", days[0]), ("other", days[1])):
         (tmp_path / name).mkdir()
         (tmp_path / name / days[0].name).write_bytes(day.read_bytes())
-    file, known = tmp_path / "data" / days[0].name, threading.Event()
-    describe, read = extraction.describe_source, extraction.read_raw
-
-    def describe_first(*given):
-        try:
-            return describe(*given)
-        finally:
-            known.set()
+    file, read = tmp_path / "data" / days[0].name, extraction.read_raw
 
     def read_the_other(*given, **options):
-        known.wait()
         with exchange(file):
             return read(*given, **options)
 
-    monkeypatch.setattr(extraction, "describe_source", describe_first)
     monkeypatch.setattr(extraction, "read_raw", read_the_other)
     done = extract(file, tmp_path / "out")
     stored = {

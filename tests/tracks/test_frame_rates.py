@@ -12,8 +12,8 @@ from helpers.track_tables import real_data
 from studies import quality
 
 import szlib
-from szlib.encounters.days import read_for_encounters
-from szlib.tracks import funnels
+from szlib.encounters.days import read_near
+from szlib.tracks import funnels, to_clock
 
 CONVENTIONS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}
 
@@ -149,7 +149,8 @@ def test_quality_and_encounters_use_the_estimated_frame_rate(tmp_path: Path) -> 
     settings = szlib.EncounterSettings(area=square, min_distance=0.0)
     whole = szlib.find_encounters(szlib.read_tracks(file), settings=settings)
     for options in (szlib.Recipe(), szlib.Recipe(frame_rate=25)):
-        tracks = read_for_encounters([file], settings, options)
+        rows = read_near([file], settings, options)
+        tracks = to_clock(rows, max_gap=options.max_gap)
         found = szlib.find_encounters(tracks, settings=settings)
         pd.testing.assert_frame_equal(found, whole)
 
