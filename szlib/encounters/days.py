@@ -420,8 +420,9 @@ def extract_day(
                 source = describe_source(files, settings, recipe, stored)
                 kept = source | {"states": stored.get("states")}
                 samples = load_day(out, day, kept)
-            status = "done" if samples is None else "kept"
-            if status == "done":
+            status = "kept"
+            if samples is None:
+                status = "done"
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
                     rows = read_near(files, settings, recipe)

@@ -159,10 +159,10 @@ def _merge(
         raise DataError(
             f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`"
         )
-    days = rows["day"].unique().sort().cast(String).to_list()
+    days = pd.Index([*rows["day"].unique().sort().cast(String)])
     codes = pd.Categorical.from_codes(rows["day"].rle_id().to_numpy(), days)
     columns = {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}
-    frame = pd.DataFrame({"day": codes, **columns})
+    frame = pd.DataFrame({"day": codes} | columns)
     frame.attrs |= {"max_gap": max_gap, "recipe": files[0].recipe.as_json()}
     if area:
         frame.attrs["area"] = area
@@ -173,8 +173,8 @@ def _merge(
         stages.append(funnels.stage(name, merged.height, merged.height, {}))
     far = {"never near the area": wanted.height - near.height}
     reasons = {"excluded day": merged.height - wanted.height, **far, **doubled}
-    last = funnels.stage("merge files", merged.height, rows.height, reasons)
-    return funnels.attach(frame, [*stages, last])
+    stages.append(funnels.stage("merge files", merged.height, rows.height, reasons))
+    return funnels.attach(frame, stages)
 
 
 def sort_rows(rows: pl.DataFrame) -> pl.DataFrame:
