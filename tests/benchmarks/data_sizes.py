@@ -33,10 +33,7 @@ ROWS = 15_000_000
 BARE = """
 import sys, polars as pl
 # begin
-names = [f"f{i}" for i in range(8)]
-near = pl.col("f2").is_between(-23500, -2500) & pl.col("f3").is_between(-15000, 13000)
-scan = pl.scan_csv(sys.argv[1], has_header=False, new_columns=names).filter(near).select(names[:4])
-scan.collect(engine="streaming")
+pl.scan_csv(sys.argv[1], has_header=False).collect(engine="streaming")
 """
 OURS = """
 import sys, szlib, tempfile
@@ -209,6 +206,6 @@ CASES: dict[str, Callable[[], dict[str, float]]] = {
 }
 
 BARS: dict[str, measuring.Bars] = {
-    "raw day to encounters": {"ours / bare scan": ("<=", 1.95)}
+    "raw day to encounters": {"ours / bare scan": ("<=", 1.7)}
 }
 """Of a case: what its numbers are held against."""
