@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -41,6 +42,7 @@ ARROW: dict[str, Any] = {
     "width": 0.008,
     "zorder": 3,
 }
+_LABEL = 40  # letters in a line of a legend under one of three figures
 # Colours and lines of ways, the one that is taken first; a print in grey keeps them apart.
 _WAYS: tuple[tuple[str, Any], ...] = (
     (BLUE, "-"),
@@ -74,7 +76,7 @@ def plot_ways(step: Step, ax: Axes | None = None) -> Axes:
     at, goal, handles = (scene.state[0], scene.state[1]), scene.goal, list[Any]()
     for i, way in enumerate(step.ways):
         colour, line = _WAYS[i % len(_WAYS)]
-        label = f"{'not ' if i else ''}taken: {way.name}, cost {way.cost:.1f} s"
+        label = fill(f"{'not ' if i else ''}taken: {way.name}, cost {way.cost:.1f} s", _LABEL)
         style: Any = {"color": colour, "linestyle": line, "zorder": 3 - i / 10}
         handles += ax.plot(*way.points.T, linewidth=2 if i else 3, label=label, **style)
         seconds = way.at(np.arange(1.0, way.times[-1]))

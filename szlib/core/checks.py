@@ -19,6 +19,7 @@ Array = NDArray[np.float64]  # an array of floats
 # Largest coordinate, speed or parameter that is accepted [m, m/s, ...]. Floats are spaced 1.5e-8 there,
 # well below the tolerance of the controller. Every map projection of the Earth stays below it.
 LARGEST = 1e8
+_NUMBERS = float, int, np.float64  # types of single numbers that are checked fast
 
 
 def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:
@@ -86,8 +87,8 @@ def check_vector(name: str, value: ArrayLike, n: int) -> list[float]:
     """The `n` numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
     row: Any = value.tolist() if isinstance(value, np.ndarray) else value
     is_row = isinstance(row, tuple | list) and len(row) == n
-    if is_row and all(type(v) is float and abs(v) <= LARGEST for v in row):
-        return list(row)
+    if is_row and all(type(v) in _NUMBERS and abs(v) <= LARGEST for v in row):
+        return list(map(float, row))
     return list(map(float, check_array(name, value, (n,))))
 
 
