@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from szlib.tracks.readers import open_rows, select_usable
+from szlib.tracks.funnels import rejection_reason
+from szlib.tracks.readers import open_rows
 from szlib.tracks.recipe import Recipe, find_recipe
 
 STANDING = 0.1
@@ -106,7 +107,7 @@ def summarise_people(path: str | Path, recipe: Recipe | None = None) -> pd.DataF
 def _usable_rows(path: str | Path, recipe: Recipe | None) -> Iterator[tuple[Recipe, pl.LazyFrame]]:
     """The recipe of a file, and a scan of its usable rows: id, t [s], x, y [m], and what else it holds."""
     with open_rows(path := Path(path), find_recipe([path], recipe)) as rows:
-        yield rows.recipe, select_usable(rows.table)
+        yield rows.recipe, rows.table.filter(rejection_reason(rows.table).is_null())
 
 
 def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "UTC") -> pd.DataFrame:

@@ -38,8 +38,14 @@ from ..core.input_files import (
 )
 from ..core.parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.clock import read_tracks, to_clock
-from ..tracks.readers import find_day, find_format, name_recordings, read_raw
+from ..tracks.clock import interpolate, read_tracks
+from ..tracks.readers import (
+    find_day,
+    find_format,
+    load_files,
+    merge_files,
+    name_recordings,
+)
 from ..tracks.recipe import Recipe, find_recipe
 from .areas import AUTO, as_area, has_calendar
 from .finding import find_encounters, find_place, select_near
@@ -74,17 +80,6 @@ _ROW: dict[str, Any] = {
     "seconds": 0.0,
     "why": "",
 }
-
-
-def read_near(
-    files: Sequence[Path], settings: EncounterSettings, recipe: Recipe
-) -> pd.DataFrame:
-    """The rows on which encounters in the `files` of one day depend, for `to_clock`.
-
-    `settings` say what counts as an encounter, `recipe` how the files are read.  `szlib.find_encounters`
-    finds the same encounters in them as in ``szlib.read_tracks(files)``.
-    """
-    return read_raw(files, recipe=recipe, select=partial(select_near, settings))
 
 
 def find_area(
@@ -418,19 +413,20 @@ def extract_day(
             stored = load_source(out, day)
             if stored:
                 source = describe_source(files, settings, recipe, stored)
-                kept = source | {"states": stored.get("states")}
-                samples = load_day(out, day, kept)
+                own = {"states": stored.get("states")}
+                samples = load_day(out, day, source | own)
             status = "kept"
             if samples is None:
                 status = "done"
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
-                    rows = read_near(files, settings, recipe)
+                    loaded = load_files(files, recipe)
                     # Checksums are computed meanwhile.
                     described = thread.submit(
                         describe_source, files, settings, recipe, source
                     )
-                    tracks = to_clock(rows, max_gap=recipe.max_gap)
+                    rows = merge_files(loaded, select=partial(select_near, settings))
+                    tracks = interpolate(rows, recipe.max_gap)
                     samples = find_encounters(tracks, settings=settings)
                 source = described.result()
         if status == "done" or source != stored:

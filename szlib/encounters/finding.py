@@ -247,15 +247,22 @@ def select_near(
     t, x, y = map(pl.col, "txy")
     # on the inner side of each edge
     inner = [x >= box.x[0], x <= box.x[1], y >= box.y[0], y <= box.y[1]]
-    times = [pl.when(is_inner).then(t) for is_inner in inner]
+    times = [pl.when(each).then(t).alias(f"{k}") for k, each in enumerate(inner)]
     margin = 2 * max_gap + VELOCITY_SPAN + _TIME_ROUNDING
-    begin = pl.max_horizontal(time.min() for time in times) - margin
-    end = pl.min_horizontal(time.max() for time in times) + margin + settings.duration
-    people = rows.lazy().group_by("day", "id")
-    near_people = people.having([is_inner.any() for is_inner in inner])
+    spans = (
+        rows.lazy()
+        .select("day", "id", *times)
+        .group_by("day", "id")
+        .agg(pl.all().min().name.prefix("first "), pl.all().max().name.prefix("last "))
+        .drop_nulls()
+        .with_columns(
+            begin=pl.max_horizontal("^first .$") - margin,
+            end=pl.min_horizontal("^last .$") + margin + settings.duration,
+        )
+    )
     near = (
         rows.lazy()
-        .join(near_people.agg(begin=begin, end=end), ["day", "id"])
+        .join(spans, ["day", "id"])
         .filter(t.is_between("begin", "end"))
         .select(rows.columns)
         .collect()

@@ -92,7 +92,7 @@ def read_tracks(
     """
     sources = list_sources(paths)
     recipe = find_recipe(sources, recipe, **parameters)
-    return _interpolate(
+    return interpolate(
         read_raw(sources, recipe=recipe, exclude=exclude), recipe.max_gap
     )
 
@@ -128,10 +128,10 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
     2  0.2  0.4  2.0
     """
     _check_rows(raw, COLUMNS[:5])
-    return _interpolate(raw, max_gap)
+    return interpolate(raw, max_gap)
 
 
-def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
+def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     """As `to_clock`, of rows that have been checked."""
     order, t, same, step = _order_rows(raw, raw["t"].to_numpy(float))
     raw = raw.iloc[order]
@@ -154,9 +154,9 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
             "are times seconds, and ids people?  Else pass frame_rate, or a longer max_gap, or if times are "
             f"Excel's days, {advise(time_unit='days')}"
         )
+    table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
     rejected = {"in a gap-free piece that covers no tick": n_lost}
     stage = funnels.stage("clock: samples", len(t), n_covered, rejected)
-    table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
     return funnels.attach(table, [*funnels.get(raw), stage])
 
 

@@ -33,7 +33,7 @@ MISSING, NO_ID = "missing or not a number", "id not a whole number"
 LAST_SECOND = 4_102_444_800.0
 FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 # number of rows, the first ones, by which the motion of people is judged
-MAX_ROWS = 200_000
+MAX_ROWS = 100_000
 # greatest median and greatest 90 % quantile of the speed of people [m/s]
 _FASTEST = (3.0, 6.0)
 _WALKS = 0.6  # smallest 90 % quantile of the speed where people walk [m/s]
@@ -69,8 +69,12 @@ def stage(
         raise SzlibError(
             f"funnel stage '{name}' does not add up: {entered} != {kept} + {reasons}"
         )
-    counts = {"entered": int(entered), "kept": int(kept)}
-    return {"stage": name, **counts, "rejected": reasons}
+    return {
+        "stage": name,
+        "entered": int(entered),
+        "kept": int(kept),
+        "rejected": reasons,
+    }
 
 
 def get(frame: pd.DataFrame) -> list[dict[str, Any]]:
@@ -119,8 +123,8 @@ def select(
     reason : why the other rows are rejected.
     """
     kept = frame[np.asarray(is_kept)].copy()
-    rejected = {reason: len(frame) - len(kept)}
-    return attach(kept, [*get(frame), stage(name, len(frame), len(kept), rejected)])
+    n, n_kept = len(frame), len(kept)
+    return attach(kept, [*get(frame), stage(name, n, n_kept, {reason: n - n_kept})])
 
 
 def table(stages: Stages) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 import polars as pl
-from polars import Expr, LazyFrame, Series, String, col, exceptions, lit
+from polars import Expr, Series, String, col, exceptions, lit
 
 from ..core.errors import DataError, warn
 from ..core.input_files import explain_errors, printable
@@ -78,7 +78,6 @@ def read_raw(
     *,
     recipe: Recipe | None = None,
     exclude: Iterable[str] = (),
-    select: Select | None = None,
 ) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
@@ -87,7 +86,6 @@ def read_raw(
     paths : as in `szlib.read_tracks`.
     recipe : how files are read; None takes that beside the files, or finds one.
     exclude : days "YYYY-MM-DD" to leave out.
-    select : a function of the rows, their area and longest gap [s], that gives those needed, sorted.
 
     Returns
     -------
@@ -108,14 +106,18 @@ def read_raw(
     0  walk   1  0.0  0.0  0.0
     1  walk   1  0.4  0.5  0.0
     """
-    sources = list_sources(paths)
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
+    return merge_files(load_files(paths, recipe), excluded)
+
+
+def load_files(paths: Any, recipe: Recipe | None) -> list[LoadedFile]:
+    """Load files, or tables, one or many, each by itself; `paths` and `recipe` as in `read_raw`."""
+    sources = list_sources(paths)
     if not sources:
         raise DataError("no track file was given; pass at least one path")
     recipe = find_recipe(sources, recipe)
     files = [_read_file(source, k, recipe) for k, source in enumerate(sources, 1)]
-    files = separate_recordings(files) if len(files) > 1 else files
-    return _merge(files, excluded, select)
+    return separate_recordings(files) if len(files) > 1 else files
 
 
 def list_sources(paths: Any) -> list[Any]:
@@ -124,8 +126,10 @@ def list_sources(paths: Any) -> list[Any]:
     return [paths] if is_one else list(paths)
 
 
-def _merge(
-    files: Sequence[LoadedFile], excluded: Sequence[str], select: Select | None
+def merge_files(
+    files: Sequence[LoadedFile],
+    excluded: Sequence[str] = (),
+    select: Select | None = None,
 ) -> pd.DataFrame:
     """Merge the rows of `files` into one table as from `read_raw`: sorted, without duplicates.
 
@@ -281,15 +285,11 @@ def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
         warn(f"{where}: rejected rows: {', '.join(counts)}")
 
 
-def select_usable(scan: LazyFrame) -> LazyFrame:
-    """The usable rows of a `scan` as in `Rows`."""
-    return scan.filter(rejection_reason(scan).is_null())
-
-
 def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:
     """A description of file `path`, read with a `recipe`, by its first rows; and this recipe, completed."""
     with open_rows(path, recipe) as rows:
-        first = select_usable(rows.table).head(funnels.MAX_ROWS).collect()
+        usable = rejection_reason(rows.table).is_null()
+        first = rows.table.filter(usable).head(funnels.MAX_ROWS).collect()
     return describe_rows(first, rows.recipe, path.name), rows.recipe
 
 
@@ -303,7 +303,8 @@ def find_format(path: Path, recipe: Recipe) -> Recipe:
 def find_day(path: Path, recipe: Recipe) -> str | None:
     """The day on which file `path`, read with a `recipe`, begins; None where it has none."""
     with suppress(DataError, OSError), open_rows(path, recipe, _HEAD) as rows:
-        first = select_usable(rows.table).head(1).collect()
+        usable = rejection_reason(rows.table).is_null()
+        first = rows.table.filter(usable).head(1).collect()
         if "day" not in rows.recipe.columns:
             dates = first.get_column(
                 "day", default=local_dates(first["t"], rows.recipe)
@@ -338,17 +339,14 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     its pieces.  Raises DataError where somebody in two of them is in two places at once, or two recordings
     have the same name.
     """
-    paths = [file.path for file in files]
-    names = name_recordings(paths)
-    check_names(
-        [name for name, file in zip(names, files, strict=True) if file.is_named]
+    names = name_recordings([file.path for file in files])
+    pairs = [*zip(files, names, strict=True)]
+    check_names([name for file, name in pairs if file.is_named])
+    named = [file.with_day(name) if file.is_named else file for file, name in pairs]
+    rows = pl.concat(
+        f.rows.select(col.day.cast(String), "id", "t", "x", "y", file=k)
+        for k, f in enumerate(named)
     )
-    named = [
-        file.with_day(name) if file.is_named else file
-        for file, name in zip(files, names, strict=True)
-    ]
-    keys = [col.day.cast(String), col("id", "t", "x", "y")]
-    rows = pl.concat(f.rows.select(*keys, file=k) for k, f in enumerate(named))
     rows = rows.filter((col.file.min() != col.file.max()).over("day", "id"))
     step = col("t", "x", "y", "file").diff().over("day", "id")
     steps = rows.sort("day", "id", "t").with_columns(step)

@@ -324,7 +324,7 @@ def scan_streamed(file: File) -> Rows | None:
         extra_columns="ignore", raise_if_empty=False, glob=False, row_index_name="line", row_index_offset=1,
     )  # fmt: skip
     ragged = col("extra").is_not_null() | col(f"f{shape.n_fields - 1}").is_null()
-    named = {name: col(f"f{at}") for name, at in recipe.columns.items()}
-    table = scan.select("line", ragged=ragged, **named)
-    table = table.with_columns(col("^(x|y|speed)$") * recipe.metres)
+    values = {name: col(f"f{at}") for name, at in recipe.columns.items()}
+    metres = col("^(x|y|speed)$") * recipe.metres
+    table = scan.select("line", ragged=ragged, **values).with_columns(metres)
     return Rows(file.path, recipe, table, n_bytes=file.plain.stat().st_size)

@@ -26,6 +26,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -230,10 +231,10 @@ def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
     from .. import EncounterSettings, find_encounters
-    from ..encounters.days import read_near
-    from ..encounters.finding import find_place
-    from ..tracks import datasets, funnels, to_clock
-    from ..tracks.readers import describe_file
+    from ..encounters.finding import find_place, select_near
+    from ..tracks import datasets, funnels
+    from ..tracks.clock import interpolate
+    from ..tracks.readers import describe_file, load_files, merge_files
     from ..tracks.recipe import COMMAND_VARIABLE, FILE_NAME
 
     files = datasets.find([options.file])
@@ -247,8 +248,9 @@ def _inspect(options: argparse.Namespace) -> int:
     print(description)
     # The funnel shows the same counts.
     with warnings.catch_warnings(action="ignore", category=DataWarning):
-        rows = read_near(files, settings, reading)
-        tracks = to_clock(rows, max_gap=reading.max_gap)
+        loaded = load_files(files, reading)
+        rows = merge_files(loaded, select=partial(select_near, settings))
+        tracks = interpolate(rows, reading.max_gap)
         tracks, area = find_place(tracks, settings)
         samples = find_encounters(tracks, settings=replace(settings, area=area))
     print(f"area {area}")

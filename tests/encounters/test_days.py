@@ -174,13 +174,13 @@ def test_rows_are_of_the_bytes_of_their_checksum(
     for name, day in (("data", days[0]), ("other", days[1])):
         (tmp_path / name).mkdir()
         (tmp_path / name / days[0].name).write_bytes(day.read_bytes())
-    file, read = tmp_path / "data" / days[0].name, extraction.read_raw
+    file, read = tmp_path / "data" / days[0].name, extraction.load_files
 
     def read_the_other(*given, **options):
         with exchange(file):
             return read(*given, **options)
 
-    monkeypatch.setattr(extraction, "read_raw", read_the_other)
+    monkeypatch.setattr(extraction, "load_files", read_the_other)
     done = extract(file, tmp_path / "out")
     stored = {
         name: content

@@ -12,7 +12,7 @@ import szlib
 from szlib.encounters.finding import select_near
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
-from szlib.tracks.readers import read_raw
+from szlib.tracks.readers import load_files, merge_files, read_raw
 
 SPACE = szlib.AttentionalSpace(length=2.5, width=2.0)
 
@@ -62,7 +62,8 @@ def read_near(
     """The rows of a file that windows of a `duration` in an `area` can depend on."""
     settings = szlib.EncounterSettings(area=area, duration=duration)
     recipe = szlib.Recipe(max_gap=max_gap)
-    return read_raw(path, recipe=recipe, select=partial(select_near, settings))
+    loaded = load_files(path, recipe)
+    return merge_files(loaded, select=partial(select_near, settings))
 
 
 def assert_selected_as_whole(

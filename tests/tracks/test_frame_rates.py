@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ from helpers.track_tables import real_data
 from studies import quality
 
 import szlib
-from szlib.encounters.days import read_near
+from szlib.encounters.finding import select_near
 from szlib.tracks import funnels, to_clock
+from szlib.tracks.readers import load_files, merge_files
 
 CONVENTIONS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}
 
@@ -149,7 +151,9 @@ def test_quality_and_encounters_use_the_estimated_frame_rate(tmp_path: Path) -> 
     settings = szlib.EncounterSettings(area=square, min_distance=0.0)
     whole = szlib.find_encounters(szlib.read_tracks(file), settings=settings)
     for options in (szlib.Recipe(), szlib.Recipe(frame_rate=25)):
-        rows = read_near([file], settings, options)
+        rows = merge_files(
+            load_files(file, options), select=partial(select_near, settings)
+        )
         tracks = to_clock(rows, max_gap=options.max_gap)
         found = szlib.find_encounters(tracks, settings=settings)
         pd.testing.assert_frame_equal(found, whole)

@@ -167,14 +167,14 @@ def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
             settings=PlazaSettings(n_encounters=5, date=f"2000-01-0{k}"),
         )
     (tmp_path / "rubbish.csv").write_text("rubbish\n")
-    read = days.read_near
+    read = days.load_files
 
     def read_or_fail(files, *arguments):
         if files[0].name == "unforeseen.csv":
             raise KeyError("foreign")
         return read(files, *arguments)
 
-    monkeypatch.setattr(days, "read_near", read_or_fail)
+    monkeypatch.setattr(days, "load_files", read_or_fail)
     table = szlib.extract_days(
         tmp_path, out=tmp_path / "out", progress=False
     ).table.set_index("day")
