@@ -225,7 +225,7 @@ class StepClock:
     def __init__(self, dt: float) -> None:
         self.now, self.has_begun = 0.0, False
         self._dt, self._elapsed, self._back = dt, dt, 0.0
-        n_held = 2 * ceil(OLDEST_STATE / dt)
+        n_held = 100 * ceil(OLDEST_STATE / dt)
         self._held = deque[tuple[Array, float]](maxlen=n_held)
         self._periods, self._called = deque[float](maxlen=RATE_STEPS), 0.0
         self._goal, self._nearest = (inf, inf), inf
@@ -258,6 +258,8 @@ class StepClock:
         spans, expected = list[tuple[Array, float]](), f"0 to {OLDEST_STATE:g} s"
         require(0 <= age <= OLDEST_STATE, "state_age", age, expected, SolverError)
         for control, held in reversed(self._held):
+            if age <= 0:
+                break
             spans.append((control, min(held, age)))
             age -= spans[-1][1]
         for control, seconds in reversed([*spans, (at_first, age)]):

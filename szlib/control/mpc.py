@@ -146,8 +146,8 @@ class MPCCBF(Controller):
     there, by the controls commanded since. If a control takes effect late, by d seconds, let `now` be the
     time at which it does, and add d to `state_age`. `Step.clock` says if the times do not fit.
 
-    With a `route`, the plan heads for its farthest point in sight, at most `settings.lookahead` ahead of
-    where the route passes the robot; the people and walls on it are avoided as always.
+    With a `route`, the plan heads for its farthest point in sight, at most `settings.lookahead` and 10 m
+    ahead of where the route passes the robot; the people and walls on it are avoided as always.
 
     Examples
     --------
@@ -238,7 +238,7 @@ class MPCCBF(Controller):
         self.tracker.reset()
         self._planner.reset()
         self._near_from = inf, inf
-        self._ways.reset()
+        self._ways = WayFinder(self._fixed, self._s)
 
     def step(
         self,
@@ -528,7 +528,7 @@ class MPCCBF(Controller):
         return self._ask((*at, 0.0, 0.0), at, people).barriers.h(*at)
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
-        """True if h < 0 at the `goal`, because of something fixed or of one of `people` who stands."""
+        """True if h < 0 at the `goal`, because of something fixed or of who stands among `people`."""
         return self._ask(np.zeros(4), goal, people).goal_blocked
 
     def check_start(
@@ -545,6 +545,9 @@ class MPCCBF(Controller):
         scene, limit = self._ask(state, goal, people), self._s.v_max
         *at, vx, vy = scene.state
         at_start, at_goal = scene.barriers.h(*at), scene.h_of_goal
+        for place in (at, scene.goal):
+            is_free = not scene.is_solid(*place)
+            require(is_free, "start and goal", place, "outside of solids", SolverError)
         for h, fault, place, remedy in (
             (at_start, "the run starts in violation:", at, "start"),
             (at_goal, "the goal cannot be reached:", scene.goal, "choose a goal"),

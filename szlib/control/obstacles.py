@@ -202,8 +202,7 @@ class Obstacle:
     Attributes
     ----------
     kind : name of the class in logs and explanations, such as "wall"; by default that of the class.
-    priority : which violation is worse, if the robot cannot avoid all.
-    has_barrier : False: h >= 0 is required, not the barrier condition.
+    priority : which violation is worse, if the robot cannot avoid all; what has that of a wall stands still.
 
     Notes
     -----
@@ -229,7 +228,9 @@ class Obstacle:
 
     kind: ClassVar[str] = "obstacle"
     priority: ClassVar[Priority] = Priority.WALL
-    has_barrier: ClassVar[bool] = True
+    has_barrier: ClassVar[bool] = (
+        True  # False, of a body: h >= 0 is required, not the barrier condition
+    )
     numbers: tuple[float, ...]
 
     def __init_subclass__(cls) -> None:
@@ -526,7 +527,9 @@ class Obstacles(NamedTuple):
     def of(cls, items: Iterable[Obstacle], settings: MPCSettings) -> Obstacles:
         """The obstacles `items` of a robot with these `settings`."""
         groups = list[Group]()
-        for kind, of_kind in groupby(items, type):
+        for (kind, _), of_kind in groupby(
+            items, lambda each: (type(each), len(each.numbers))
+        ):
             chosen = list(of_kind)
             numbers = np.array([each.numbers for each in chosen], float)
             offsets = [settings.r_robot + each.margin(settings) for each in chosen]

@@ -6,7 +6,7 @@ A sensor is noisy and late, and loses people. By the ids of people,
                 before that, and for people without an id whenever they are slower
     position    is moved forward to now at constant velocity, for people who were seen earlier
     unseen      people stay, at constant velocity, for `memory` seconds
-    rejected    are measurements with a number that is not finite, or farther than `LARGEST`, and those from
+    rejected    are measurements with a number that is not finite, or beyond `LARGEST`, and those from
                 more than `memory` before or after now. The last known state of the same id takes their place,
                 moved forward; people without such a state are *unknown*
     late        measurements, older than what is known of the same id, are ignored
@@ -143,7 +143,7 @@ class Prediction:
 
 
 def list_knots(person: Person, settings: MPCSettings) -> Array:
-    """What a `PredictedZone` of a `person` needs for each interval of the horizon of these `settings`."""
+    """What `Zone` and `Body` of a `person` need for each interval of the horizon of these `settings`."""
     times, offsets = np.array(settings.times), np.zeros((settings.N + 1, 3))
     if person.prediction is not None:
         offsets = person.prediction.sample(person, times)
@@ -205,7 +205,7 @@ class Person:
     id : by which a `Tracker` recognises them; None: they are new at each step.
     heading_unknown : True if they are too slow for the velocity to give the heading: then it is `heading`.
     prediction : where they will be; None: they keep their velocity. The problem and the ways use it. What a
-        step claims (`Step.safe`, `Step.passively_safe`) is about people who keep their velocity.
+        step claims of bodies (`Step.passively_safe`) is about people who keep their velocity.
     group : with whom they are together: a way between two of a group has a price. None: whoever is near and
         has a like velocity (`szlib.control.ways`).
 

@@ -190,7 +190,7 @@ def list_conditions(
         stops = tuple((1 - stop) ** m for m in lengths)
         found.append(Condition(Priority.WALL, stops))
     elif has_floors:
-        found.append(Condition(Priority.ZONE, (0.0,) * s.N_h))
+        found.append(Condition(kind.priority, (0.0,) * s.N_h))
     return tuple(found)
 
 

@@ -85,8 +85,12 @@ class Scene(NamedTuple):
 
     @property
     def goal_blocked(self) -> bool:
-        """True if h < 0 at the goal, because of something fixed or of a person who stands there."""
-        return bool((self.h_of_goal < 0).any())
+        """True if h < 0 at the goal, because of something fixed or of a person who stands; or in a solid."""
+        return self.is_solid(*self.goal) or bool((self.h_of_goal < 0).any())
+
+    def is_solid(self, x: float, y: float) -> bool:
+        """True if walls enclose the place (x, y) [m]."""
+        return bool(shapely.contains_xy(self.solids, x, y))
 
     def name(self, i: int) -> str:
         """Name of the obstacle `i` of `Step.obstacles`, such as "wall 0 (0, 0, 5, 0)"."""
@@ -106,8 +110,8 @@ class Scene(NamedTuple):
         """
         if self.tracked.unknown:
             return "the position of a person is unknown, so the robot comes to rest"
-        solids, barriers = self.solids, self.barriers
-        if solids is not None and shapely.contains_xy(solids, *path.points[0]):
+        barriers = self.barriers
+        if self.is_solid(*path.points[0]):
             return "the robot is inside of a solid wall"
         x, y = path.points.T
         now, then = barriers.h(x, y, path.times).T

@@ -221,8 +221,8 @@ def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
             yield "the step says that it can stop before every wall; it cannot"
         moved = points[::PIECES] - points[0]
         nearer = ((places - points[0]) @ moved.T > TOLERANCE).any(axis=1)
-        overlaps = gaps[~is_fixed, 0] < -TOLERANCE
-        is_hit: Array = np.where(overlaps, nearer, touches[~is_fixed])
+        overlaps = gaps[: len(places), 0] < -TOLERANCE
+        is_hit: Array = np.where(overlaps, nearer, touches[: len(places)])
         rests = np.hypot(*np.ptp(points, axis=0)) <= AT_REST * s.dt
         is_clear.append(bool(rests or not is_hit.any()))
     if step.passively_safe and not any(is_clear):

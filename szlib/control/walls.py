@@ -49,7 +49,10 @@ def read_walls(walls: Any) -> Array:
     lines = np.concatenate([[], *(lines for lines, _ in _find_shapes(walls))])
     check_array("a wall", shapely.get_coordinates(lines), (..., 2))
     lines = shapely.remove_repeated_points(lines, SHORTEST_WALL)
-    is_long, expected = shapely.length(lines) > 0, f"{SHORTEST_WALL} m long or longer"
+    is_long, expected = (
+        shapely.length(lines) >= SHORTEST_WALL,
+        f"{SHORTEST_WALL} m long or longer",
+    )
     require(is_long.all(), "a wall", lines[~is_long], expected, SolverError)
     corners, line = shapely.get_coordinates(lines, return_index=True)
     ends = np.stack([corners[:-1], corners[1:]], axis=1)
@@ -57,9 +60,12 @@ def read_walls(walls: Any) -> Array:
 
 
 class Walls(np.ndarray[Any, np.dtype[np.float64]]):
-    """Segments, shape (n, 2, 2) [m], that enclose the areas `solids`; what is computed from them does not."""
+    """Segments, shape (n, 2, 2) [m], that enclose the areas `solids`; a copy does not."""
 
     solids: Any
+
+    def __reduce__(self) -> Any:
+        return _enclose, (np.asarray(self), self.solids)
 
 
 def find_solids(walls: Any) -> Any:
@@ -157,7 +163,7 @@ def walls_from_map(
         what = f"image {entries['image']!r}"
         picture = Image.open(io.BytesIO(read_small(folder / entries["image"])))
         require(picture.mode in _PICTURES, "its mode", picture.mode, f"of {_PICTURES}")
-        grey = np.asarray(picture.convert("L"), float)
+        grey = np.asarray(picture.convert("RGB"), float).mean(axis=2)
     # whatever YAML, Pillow and NumPy say of a bad file
     except Exception as fault:
         expected = "a YAML file of map_server, whole, with an opaque PGM or PNG picture"
@@ -183,7 +189,7 @@ def walls_from_grid(
     occupied : True where a cell is occupied, shape (rows, columns), the row of the smallest y first.
     resolution : side of a cell [m].
     origin : (x, y, yaw) of the outer corner of the first cell [m, rad].
-    simplify : an outline may deviate by this much from that of the cells [m].
+    simplify : an outline may deviate by this much from that of the cells, by twice as much at corners [m].
 
     Raises
     ------
@@ -212,6 +218,10 @@ def walls_from_grid(
     c, s = side * cos(yaw), side * sin(yaw)
     turn = [c, -s, s, c, x, y]
     solids = affine_transform(shapely.simplify(outlines, within / side), turn)
-    walls = read_walls(solids).view(Walls)
+    return _enclose(read_walls(solids), solids)
+
+
+def _enclose(segments: Array, solids: Any) -> Walls:
+    walls = segments.copy().view(Walls)
     walls.solids = solids
     return walls

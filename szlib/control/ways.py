@@ -45,7 +45,7 @@ Mask = NDArray[np.bool_]
 CELL = 0.15
 """Side of a cell [m] (assumed)."""
 MOST_CELLS = 250_000
-"""Number of cells of a map; those of a larger one are larger (assumed)."""
+"""Number of cells of a map, without its margin; those of a larger one are larger (assumed)."""
 SEARCH_RADIUS, SEARCH_TIME = 4.0, 6.0
 """How far the search looks, from the robot [m], and in time [s] (assumed)."""
 SEARCH_INTERVAL = 0.4
@@ -91,7 +91,7 @@ class Way(NamedTuple):
 
     Attributes
     ----------
-    points : from where the robot was when the way was found, at most `SEARCH_INTERVAL` ago, shape (k, 2) [m].
+    points : from where the robot was when the way was found, about `SEARCH_INTERVAL` ago, shape (k, 2) [m].
     times : when the robot is there, from then on, shape (k,) [s].
     cost : time to the end, and the prices on the way [s].
     name : in words, such as "left of person 3, behind person 5".
@@ -296,9 +296,11 @@ class WayFinder:
 
     def follow(self, at: Point, goal: Point, route: Array) -> Heading | None:
         """The target from `at` on a `route` to the `goal`, shape (m, 2) [m]; None if no point is in sight."""
-        m, self._steps = self._get_map(at, goal), 0
-        line = shapely.LineString(np.vstack([route, goal]))
-        points = shapely.get_coordinates(shapely.segmentize(line, m.cell))
+        m, self._steps, self._standing = self._get_map(at, goal), 0, None
+        m.blocked = ~m.free
+        line = shapely.LineString(np.vstack([route, goal, goal]))
+        line = shapely.segmentize(line, m.cell) if line.length else line
+        points = shapely.get_coordinates(line)
         heading, is_seen = self._head_for(m, at, points)
         return heading if is_seen else None
 

@@ -22,6 +22,7 @@ from szlib.control.controller import advance, find_stopping_path
 from szlib.control.obstacles import (
     Body,
     Path,
+    Priority,
     barrier,
     cbf_residual,
     describe,
@@ -500,3 +501,57 @@ def test_an_obstacle_is_restored_from_its_kind_and_numbers():
         restore({"kind": "sofa", "numbers": [1.0]})
     names = number_kinds([Wall(0, 0, 1, 0), EDGE, Wall(0, 1, 1, 1)])
     assert names == ["wall_0", "half-plane_0", "wall_1"]
+
+
+class Disc(Obstacle):
+    """A disc of a user, whose violation is as bad as that of a zone."""
+
+    priority = Priority.ZONE
+
+    @staticmethod
+    def distance(x, y, t, px, py, radius):
+        return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - radius
+
+
+class Bollard(Disc):
+    priority = Priority.BODY
+
+
+class Polygon(Obstacle):
+    """The half-planes of a convex polygon, of any number."""
+
+    @staticmethod
+    def distance(x, y, t, *edges):
+        lines = [edges[k : k + 3] for k in range(0, len(edges), 3)]
+        distances = [nx * x + ny * y - d for nx, ny, d in lines]
+        return sum(d**2 for d in distances) ** 0.5
+
+
+@pytest.mark.parametrize("kind", [Disc, Bollard])
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_a_step_beside_a_users_obstacle_of_any_priority_is_verified(kind, n):
+    people = [[k, 3, 0, 0] for k in range(n)]
+    controller = szlib.MPCCBF(ZONE, obstacles=[kind(2, 0.1, 0.3)], settings=S)
+    assert controller.step((0, 0, 0.5, 0), (5, 0), people).verify().ok
+
+
+def test_no_body_of_a_user_is_bought_at_the_price_of_a_zone():
+    settings = szlib.MPCSettings.among_people(time_limit=np.inf)
+    rng = np.random.default_rng(0)
+    for x, y, speed in rng.uniform((1, -0.3, 0.5), (2, 0.3, 0.9), (40, 3)):
+        controller = szlib.MPCCBF(
+            ZONE, obstacles=[Bollard(x, y, 0.3)], settings=settings
+        )
+        step = controller.step((0, 0, speed, 0), (5, 0))
+        assert step.status != "optimal" or step.feasible
+
+
+def test_obstacles_of_one_class_may_have_different_numbers():
+    triangle = Polygon(0, 1, 3, 1, 0, 3, 0, -1, 3)
+    two = Polygon(0, 1, 3, 1, 0, 3)
+    step = szlib.MPCCBF(ZONE, obstacles=[triangle, two, triangle]).step(
+        (0, 0, 0, 0), (1, 0)
+    )
+    np.testing.assert_allclose(
+        step.h, np.array([27, 18, 27]) ** 0.5 - S.r_robot - S.eps
+    )

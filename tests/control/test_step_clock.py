@@ -210,6 +210,16 @@ def test_an_age_that_cannot_be_used_is_refused(age):
         szlib.MPCCBF(ZONE).step(START, GOAL, state_age=age)
 
 
+def test_commands_faster_than_dt_are_remembered_as_long_as_a_state_may_be_old():
+    controller, x, states = szlib.MPCCBF(ZONE, settings=AT_LEISURE), np.zeros(4), []
+    for k in range(60):
+        states.append(x)
+        step = controller.step(x, (9, 0), now=0.02 * k)
+        x = advance(x, step.control, 0.02)
+    step = controller.step(states[30], (9, 0), now=1.2, state_age=0.6)
+    np.testing.assert_allclose(step.scene.state, x, atol=1e-9)
+
+
 # no progress
 
 

@@ -324,3 +324,35 @@ def test_arrays_computed_from_walls_do_not_claim_their_solids() -> None:
     walls = walls_from_grid(np.ones((4, 4)), 1.0)
     assert find_solids(walls).area == pytest.approx(16.0)
     assert find_solids(walls + 5.0) is None and find_solids([]) is None
+
+
+def test_a_goal_or_a_start_inside_of_a_solid_is_blocked():
+    controller = szlib.MPCCBF(ZONE, walls=shapely.box(3, -5, 13, 5))
+    assert controller.goal_blocked((8, 0)) and not controller.goal_blocked((0, 0))
+    assert controller.step((0, 0, 0, 0), (8, 0)).goal_blocked
+    for start, goal in (((0, 0, 0, 0), (8, 0)), ((8, 0, 0, 0), (0, 0))):
+        with pytest.raises(szlib.SolverError, match="outside of solids"):
+            controller.check_start(start, goal)
+
+
+def test_walls_sent_to_another_process_enclose_what_is_solid():
+    grid = np.zeros((10, 10), bool)
+    grid[3:6, 3:6] = True
+    sent = pickle.loads(pickle.dumps(walls_from_grid(grid, 1.0)))
+    assert not szlib.MPCCBF(ZONE, walls=sent).step((4.5, 4.5, 0, 0), (9, 9)).safe
+
+
+def test_a_coloured_cell_is_as_dark_as_the_mean_of_its_channels(tmp_path):
+    picture = np.full((10, 10, 3), 254, np.uint8)
+    picture[4:6, 4:6] = (0, 255, 0)
+    Image.fromarray(picture).save(tmp_path / "map.png")
+    entries = ENTRIES | {"image": "map.png"}
+    text = "\n".join(f"{name}: {value}" for name, value in entries.items())
+    (tmp_path / "map.yaml").write_text(text)
+    assert len(szlib.walls_from_map(tmp_path / "map.yaml")) == 4
+
+
+@pytest.mark.parametrize("length", [1e-9, 5e-4])
+def test_a_wall_shorter_than_a_millimetre_is_refused(length):
+    with pytest.raises(szlib.SolverError, match=r"0\.001 m long or longer"):
+        read_walls([(0, 0), (length, 0)])

@@ -715,3 +715,32 @@ def test_a_group_that_is_given_is_passed_around_though_its_members_are_far_apart
         )
         sides.append(float(np.abs(step.ways[0].points[:, 1]).max()))
     assert sides[0] == sides[1] < 1.0 and sides[2] > 1.4
+
+
+@pytest.mark.parametrize("route", [[(5, 0)], [(5, 0), (5, 0)], np.zeros((0, 2))])
+@pytest.mark.parametrize("settings", [PLAIN, AMONG])
+def test_a_route_that_is_only_the_goal_leads_there(settings, route):
+    step = szlib.MPCCBF(ZONE, settings=settings).step((0, 0, 0, 0), (5, 0), route=route)
+    assert step.target[0] > 1 and abs(step.target[1]) < 1e-6
+
+
+def test_people_who_left_do_not_hide_a_route():
+    controller, fresh = (szlib.MPCCBF(ZONE, settings=AMONG) for _ in range(2))
+    controller.step((0, 0, 0, 0), (9, 0), [[2.0, 0, 0, 0]])
+    route = [(0, 0), (9, 0)]
+    for _ in range(30):
+        step = controller.step((0, 0, 0, 0), (9, 0), route=route)
+    expected = fresh.step((0, 0, 0, 0), (9, 0), route=route).target
+    np.testing.assert_allclose(step.target, expected)
+
+
+def test_a_reset_controller_is_as_a_new_one():
+    used, new = (
+        szlib.MPCCBF(ZONE, walls=[[(2, -6), (2, -0.2)]], settings=AMONG)
+        for _ in range(2)
+    )
+    used.step((-3.3, 0.41, 0, 0), (7.1, 0.77))
+    used.reset()
+    one, other = (each.step((0, 0, 0, 0), (6, 0)) for each in (used, new))
+    np.testing.assert_array_equal(one.target, other.target)
+    np.testing.assert_array_equal(one.control, other.control)
