@@ -31,7 +31,7 @@ def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(
     assert fitted.semi_axes == pytest.approx(true.semi_axes, abs=0.04)
     assert {path.name for path in tmp_path.iterdir()} == {
         "plaza.csv",
-        "zone.png",
+        "plaza_zone.png",
         "corridor.png",
     }
 

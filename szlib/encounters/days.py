@@ -378,8 +378,7 @@ def extract_days(
     ]
     found = run_tasks(tasks, n_jobs=n_jobs)
     # With disable=None the bar is shown in a terminal.
-    hidden = None if progress else True
-    rows = list(tqdm(found, total=len(tasks), unit="day", disable=hidden))
+    rows = list(tqdm(found, total=len(tasks), unit="day", disable=not progress or None))
     for day in days.keys() & excluded:
         rows.append(_ROW | {"day": day, "files": len(days[day])})
     table = pd.DataFrame(rows, columns=list(_ROW)).sort_values("day", ignore_index=True)

@@ -225,11 +225,12 @@ def select_near(
     Notes
     -----
     A raw day has 15 million rows, most of them far from the area. `szlib.find_encounters` finds the same
-    encounters in the selected rows as in all rows, bit for bit. The proof uses these terms: g is the longest
-    gap [s] within a track; "the rectangle" is the smallest one along the axes around the area, grown by the
-    5 m in which kinds of encounter are decided. A person comes near at time F: until then all rows are
-    beyond one edge of the rectangle, and F is the latest such time of its four edges. In the same way L is
-    the time after which all rows are beyond one edge.
+    encounters in the selected rows as in all rows, but for the last digits of positions: `to_clock` adds up
+    the times of all people. The proof uses these terms: g is the longest gap [s] within a track; "the
+    rectangle" is the smallest one along the axes around the area, grown by the 5 m in which kinds of
+    encounter are decided. A person comes near at time F: until then all rows are beyond one edge of the
+    rectangle, and F is the latest such time of its four edges. In the same way L is the time after which all
+    rows are beyond one edge.
 
     1. A tick of the clock lies between two rows at most g apart. If both are before F, both are beyond the
        same edge, and the tick is too. So ticks inside lie from F - g to L + g. No speed is assumed.
@@ -262,7 +263,7 @@ def select_near(
     )
     near = (
         rows.lazy()
-        .join(spans, ["day", "id"])
+        .join(spans, ["day", "id"], maintain_order="left")
         .filter(t.is_between("begin", "end"))
         .select(rows.columns)
         .collect()

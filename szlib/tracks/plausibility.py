@@ -21,10 +21,10 @@ def describe_rows(rows: pl.DataFrame, recipe: Recipe, name: str) -> str:
     lines = [f"{name} is read as {recipe.file_format}: {shown}"]
     if rows.height == 0:
         return lines[0]
-    t, _, x, y = seen = first_rows(rows)
+    t, people, x, y = seen = first_rows(rows)
     first = "first " if len(t) == MAX_ROWS else ""
     lines.append(
-        f"{first}{len(t):,} rows: {rows['id'].n_unique():,} people in {np.ptp(t):,.1f} s"
+        f"{first}{len(t):,} rows: {len(np.unique(people)):,} people in {np.ptp(t):,.1f} s"
     )
     if motion := measure_motion(seen):
         lines.append(

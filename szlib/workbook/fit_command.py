@@ -116,6 +116,11 @@ def _read_days(
     days = Extraction.load(paths[0], exclude=exclude)
     sources = days.sources.values()
     of_days = [list(content) for source in sources for content in source["files"]]
+    checksums = [checksum for _, _, checksum in of_days]
+    if len(set(checksums)) < len(checksums):
+        raise DataError(
+            f"{paths[0]}: two of its days are one file; pass --exclude DAY, or extract into a new folder"
+        )
     files = datasets.find(tracks) if tracks else []
     other = [each for each in files if [each.name, *file_content(each)] not in of_days]
     if other:
@@ -200,6 +205,6 @@ def _require_place(file: Path) -> Path:
     for each in (file, file.with_suffix(".png")):
         if each.exists() and not is_zone:
             raise StorageError(
-                f"{printable(each)}: exists, and is no zone of szlib; choose another name"
+                f"{printable(each)}: exists, and is no zone of szlib; choose another name with --out"
             )
     return file

@@ -59,6 +59,16 @@ def test_where_nobody_comes_near_all_rows_are_kept(tmp_path):
     pd.testing.assert_frame_equal(elsewhere, read_raw(path))
 
 
+def test_of_doubled_rows_the_first_is_kept_in_every_run():
+    n, rng = 100_000, np.random.default_rng(0)
+    rows = pl.DataFrame({"id": np.arange(n) % 500, "t": np.arange(n) // 500 * 0.1})
+    rows = rows.with_columns(day=pl.lit("any"), x=-12.0, y=rng.uniform(-9, 7, n))
+    doubled = pl.concat([rows, rows.with_columns(y=pl.col("y") + 0.2)])
+    for _ in range(12):  # Polars joins in parallel, in any order unless told
+        first = select(doubled).group_by("id", "t", maintain_order=True).first()
+        assert first.join(rows, ["id", "t", "y"], "anti").height == 0
+
+
 def select(rows, duration=3.0, max_gap=0.5):
     settings = szlib.EncounterSettings(area=szlib.ATC_SQUARE, duration=duration)
     return select_near(settings, rows, None, max_gap)

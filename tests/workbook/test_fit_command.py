@@ -115,6 +115,22 @@ def test_kinds_are_those_of_the_library(recording, tmp_path):
     assert szlib.SocialZone.load(out).ellipses == expected.ellipses
 
 
+def test_a_file_that_is_two_days_of_a_folder_is_refused(tmp_path, capsys):
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv"))
+    tracks["t"] -= tracks["t"].min()
+    folders = tmp_path / "one", tmp_path / "two"
+    for k, folder in enumerate(folders):
+        folder.mkdir()
+        moved = tracks.assign(x=tracks["x"] + k)[["t", "id", "x", "y"]]
+        moved.to_csv(folder / "hall.csv", index=False)
+    given = {"out": tmp_path / "days", "area": szlib.ATC_SQUARE, "progress": False}
+    szlib.extract_days(folders[1], **given)
+    szlib.extract_days(folders, **given)
+    capsys.readouterr()
+    assert fit(tmp_path / "days", "--out", tmp_path / "zone.json") != 0
+    assert "two of its days are one file" in capsys.readouterr().err
+
+
 def test_excluded_day_is_not_fitted(recording, tmp_path, capsys):
     arguments = [
         recording.with_name("days"),
