@@ -248,11 +248,11 @@ def select_near(
     t, x, y = map(pl.col, "txy")
     # on the inner side of each edge
     inner = [x >= box.x[0], x <= box.x[1], y >= box.y[0], y <= box.y[1]]
-    times = [pl.when(each).then(t).alias(f"{k}") for k, each in enumerate(inner)]
+    times = {f"{k}": pl.when(each).then(t) for k, each in enumerate(inner)}
     margin = 2 * max_gap + VELOCITY_SPAN + _TIME_ROUNDING
     spans = (
         rows.lazy()
-        .select("day", "id", *times)
+        .select("day", "id", **times)
         .group_by("day", "id")
         .agg(pl.all().min().name.prefix("first "), pl.all().max().name.prefix("last "))
         .drop_nulls()
@@ -263,8 +263,10 @@ def select_near(
     )
     near = (
         rows.lazy()
-        .join(spans, ["day", "id"], maintain_order="left")
+        .with_row_index()
+        .join(spans, ["day", "id"])
         .filter(t.is_between("begin", "end"))
+        .sort("index")
         .select(rows.columns)
         .collect()
     )
