@@ -307,8 +307,8 @@ class SocialZone:
         if self.method == "respect":
             return "respect: the zone that people keep; it lies in the intervals with a probability of 95 %"
         return (
-            f"{self.method}: where (nearly) nobody was; the 95 % intervals are of that with everybody there is, "
-            "so a hull of few can lie above them; they are not of the zone that people keep"
+            f"{self.method}: where (nearly) nobody was; the 95 % intervals are of that with everybody "
+            "there is, so a hull of few can lie above them; they are not of the zone that people keep"
         )
 
     @property
