@@ -89,7 +89,7 @@ class Scene(NamedTuple):
         return self.is_solid(*self.goal) or bool((self.h_of_goal < 0).any())
 
     def is_solid(self, x: float, y: float) -> bool:
-        """True if walls enclose the place (x, y) [m]."""
+        """True if walls enclose the place (`x`, `y`) [m]."""
         return bool(shapely.contains_xy(self.solids, x, y))
 
     def name(self, i: int) -> str:
