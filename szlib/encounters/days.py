@@ -237,8 +237,8 @@ class Extraction:
                 space = AttentionalSpace(**parameters.pop("space"))
                 settings = EncounterSettings(space=space, **parameters)
             first = next(iter(sources))
-            own = {"files": None, "states": None}
-            if sources[day] | own != sources[first] | own:
+            of_day = {"files": None, "states": None}
+            if sources[day] | of_day != sources[first] | of_day:
                 raise DataError(
                     f"{folder}: {day} was extracted with other settings than {first}, or another version; "
                     "extract all days again, or exclude it"
@@ -412,8 +412,8 @@ def extract_day(
             stored = load_source(out, day)
             if stored:
                 source = describe_source(files, settings, recipe, stored)
-                own = {"states": stored.get("states")}
-                samples = load_day(out, day, source | own)
+                before = {"states": stored.get("states")}
+                samples = load_day(out, day, source | before)
             status = "kept"
             if samples is None:
                 status = "done"

@@ -132,7 +132,7 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
 
 
 def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
-    """As `to_clock`, of rows `raw` that have been checked; `max_gap` is meant alike."""
+    """As `to_clock`, of rows `raw` that have been checked; `max_gap` is as there."""
     order, t, same, step = _order_rows(raw, raw["t"].to_numpy(float))
     raw = raw.iloc[order]
     if max_gap is None:

@@ -64,7 +64,7 @@ def test_of_doubled_rows_the_first_is_kept_in_every_run():
     rows = pl.DataFrame({"id": np.arange(n) % 500, "t": np.arange(n) // 500 * 0.1})
     rows = rows.with_columns(day=pl.lit("any"), x=-12.0, y=rng.uniform(-9, 7, n))
     doubled = pl.concat([rows, rows.with_columns(y=pl.col("y") + 0.2)])
-    for _ in range(12):  # Polars joins in parallel, in any order unless told
+    for _ in range(12):  # a join in parallel may change the order of rows
         first = select(doubled).group_by("id", "t", maintain_order=True).first()
         assert first.join(rows, ["id", "t", "y"], "anti").height == 0
 
