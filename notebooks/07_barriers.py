@@ -452,7 +452,7 @@ record.check("d by hand is the library's d", off < 1e-12, f"largest difference {
 # %% jupyter={"source_hidden": true}
 # Figure
 ax = plots.plot_distance(zone)
-ax.set_title("The robot's centre must stay outside the red line")
+ax.set_title("The robot's centre must stay outside the orange line")
 record.figure(ax.figure, "ellipse")
 
 # %% [markdown]
@@ -472,7 +472,7 @@ record.figure(ax.figure, "ellipse")
 # Figure
 wall = (np.array([-1.0, 0.0]), np.array([1.0, 0.0]))
 ax = plots.plot_distance(wall)
-ax.set_title("Around a wall the red line closes behind both ends")
+ax.set_title("Around a wall the orange line closes behind both ends")
 record.figure(ax.figure, "segment")
 
 # %% jupyter={"source_hidden": true}
