@@ -75,18 +75,16 @@ def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -
     """
     now, dt = np.array(state), s.dt
     after = advance(now, control, dt)
-    (x, y), velocity = after[:2] - now[:2], after[2:]
+    velocity = after[2:]
     fastest = float(np.abs(velocity).max())
     piece = dt * max(1, ceil(fastest / s.a_max / dt / _MOST_PIECES))
     speeds = np.append(np.arange(fastest, 0.0, -s.a_max * piece), 0.0)
     times = piece * np.arange(len(speeds))
     gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / (fastest or 1.0)
     points = np.vstack([now[:2], after[:2], after[:2] + gone[:, None] * velocity])
-    sideways = abs(x * control[1] - y * control[0]) / (hypot(x, y) or 1.0)
     bows = 2**0.5 * s.a_max * piece**2 / 8 * np.ones(len(times))
     bows[0] = hypot(*control) * dt**2 / 8
-    asides = np.append(sideways * dt**2 / 8, 0.0 * gone)
-    return Path(points, np.append(0.0, dt + times), bows, asides)
+    return Path(points, np.append(0.0, dt + times), bows)
 
 
 class DoubleIntegrator:

@@ -56,12 +56,12 @@ from ..core.checks import Array, check_array, check_number, check_vector, requir
 from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
-from .obstacles import Path
+from .obstacles import Path, Point
 from .people import SpeedZone
 from .settings import MPCSettings
 from .step import Scene, Step
 from .verification import PIECES, Sampled
-from .ways import Heading, Point
+from .ways import Heading
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
 # turns that are tried, in this order [rad]
@@ -330,7 +330,7 @@ class DifferentialDrive(MPCCBF):
         """The way of the disc whose wheels follow the point on a `path`."""
         centres, commands = self._wheels.follow(self._own, path.points, path.times)
         bows = np.abs(commands.prod(axis=1)) * np.diff(path.times) ** 2 / 8
-        return Path(centres[:, :2], path.times, bows, bows)
+        return Path(centres[:, :2], path.times, bows)
 
     def _find_turn(self, own: tuple[float, ...], goal: Point) -> float:
         """Angle by which the robot turns where it stands, close to its `goal` [rad]; 0: it drives on.

@@ -55,7 +55,17 @@ from ..core.checks import (
 from ..core.errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .controller import Controller, StepClock, find_stopping_path
-from .obstacles import Group, Obstacle, Obstacles, Path, Wall, Zone, find_bodies
+from .obstacles import (
+    Group,
+    Mask,
+    Obstacle,
+    Obstacles,
+    Path,
+    Point,
+    Wall,
+    Zone,
+    find_bodies,
+)
 from .people import (
     People,
     Person,
@@ -69,7 +79,7 @@ from .planner import Plan, Planner
 from .problem import (
     Question,
     build_horizon,
-    plan_along,
+    follow_velocities,
     plan_braking,
     solve_by_ipopt,
 )
@@ -77,7 +87,7 @@ from .settings import TOLERANCE, MPCSettings
 from .step import Scene, Status, Step
 from .verification import AT_REST
 from .walls import find_solids, read_walls
-from .ways import Heading, Point, WayFinder, find_target
+from .ways import Heading, WayFinder, find_target
 
 _FEW = 24  # up to this number all obstacles are in the problem, of more those that are near
 _BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
@@ -116,8 +126,7 @@ class MPCCBF(Controller):
     zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`, such as
         a `SocialZone`, whose zone at `settings.zone_speed` is used.
     walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. Inside of
-        a polygon, or of a map's walls (`walls_from_map`), no step is safe. The attribute `walls` holds their
-        segments.
+        a polygon no step is safe. The attribute `walls` holds the segments.
     obstacles : what else stands still: `HalfPlane`s, or an `Obstacle` of your own; an attribute as well.
     settings : every other parameter.
     tracker : remembers people by their ids; default: `Tracker()`.
@@ -198,13 +207,12 @@ class MPCCBF(Controller):
         self._fixed = Obstacles.of(items, self._s)
         self._fixed_of_disc = Obstacles.of(items, self.settings)
         self._ways = WayFinder(self._fixed, self._s)
-        self._take_near(range(len(items)), (inf, inf))
+        self._take_near(np.full(len(items), True), (inf, inf))
 
-    def _take_near(self, near: Sequence[int], at: Point) -> None:
+    def _take_near(self, is_near: Mask, at: Point) -> None:
         """Take these as what is fixed near the robot, and those among them that it can always stop before."""
-        self._near, self._near_from = self._fixed.chosen(near), at
-        self._walls_near = self._fixed_of_disc.chosen(near).walls
-        self._room: tuple[Point, float] = at, -inf
+        self._near, self._near_from = self._fixed.chosen(is_near), at
+        self._walls_near = self._fixed_of_disc.chosen(is_near).walls
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
@@ -347,8 +355,11 @@ class MPCCBF(Controller):
                 return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
-            points = heading.ways[0].at(np.array(s.times))
-            other = self._planner.plan(question, plan_along(s, state, points))
+            points, times = heading.ways[0].at(np.array(s.times)), np.diff(s.times)
+            along = follow_velocities(
+                s, state[2:], np.diff(points, axis=0) / times[:, None]
+            )
+            other = self._planner.plan(question, along)
             plan = min(plan, other, key=lambda each: each.rank)
             plan = plan._replace(timed_out=other.timed_out)
         if plan.violations == (inf,):
@@ -403,18 +414,15 @@ class MPCCBF(Controller):
             dist(person.position, (x, y)) >= contact + time * hypot(*person.velocity)
             for person in scene.people
         )
-        at, room = self._room
-        if room - dist(at, (x, y)) < reach:
-            room = float(self._walls_near.gaps(x, y).min(initial=inf))
-            self._room = at, room = (x, y), room
-        return room - dist(at, (x, y)) >= reach, is_body_far
+        room = self._walls_near.gaps(x, y).min(initial=inf)
+        return bool(room >= reach), is_body_far
 
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
         s, horizon = self._s, build_horizon(self._s)
         states = horizon.states(np.array(scene.state), inputs)
         bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
-        followed = Path(states[:, :2], horizon.times, bows, bows)
+        followed = Path(states[:, :2], horizon.times, bows)
         braking = plan_braking(s, states[-1, 2:].tolist())[0]
         rest = find_stopping_path(states[-1].tolist(), braking, s)
         return followed.joined(rest._replace(times=rest.times + horizon.times[-1]))
@@ -425,7 +433,7 @@ class MPCCBF(Controller):
 
     def _bound_walls(self, path: Path) -> Bound:
         """How near the disc comes to everything fixed on a `path` on which it comes to rest."""
-        lower, seen = self._walls_near.bound(path, are_fixed=True)
+        lower, seen = self._walls_near.bound(path)
         return Bound(lower.min(initial=inf), seen.min(initial=inf))
 
     def _bound_bodies(self, bodies: Obstacles, path: Path) -> Bound:
@@ -544,18 +552,16 @@ class MPCCBF(Controller):
         """
         scene, limit = self._ask(state, goal, people), self._s.v_max
         *at, vx, vy = scene.state
-        at_start, at_goal = scene.barriers.h(*at), scene.h_of_goal
-        for place in (at, scene.goal):
-            is_free = not scene.is_solid(*place)
-            require(is_free, "start and goal", place, "outside of solids", SolverError)
-        for h, fault, place, remedy in (
-            (at_start, "the run starts in violation:", at, "start"),
-            (at_goal, "the goal cannot be reached:", scene.goal, "choose a goal"),
+        for fault, place, h in (
+            ("the run starts in violation", at, scene.barriers.h(*at)),
+            ("the goal cannot be reached", scene.goal, scene.h_of_goal),
         ):
+            is_free = not scene.is_solid(*place)
+            require(is_free, fault, place, "outside of solids", SolverError)
             if (h < 0).any():
                 i = int(h.argmin())
                 raise SolverError(
-                    f"{fault} h = {h[i]:.3f} m for {scene.name(i)} at {place}; {remedy} where h >= 0"
+                    f"{fault}: h = {h[i]:.3f} m for {scene.name(i)} at {place}; choose a place where h >= 0"
                 )
         if hypot(vx, vy) > limit:
             raise SolverError(

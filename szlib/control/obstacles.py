@@ -23,7 +23,7 @@ from math import cos, hypot, sin
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..core.checks import Array, check_array, require
 from ..core.errors import SolverError
@@ -174,6 +174,7 @@ def check_wall(wall: ArrayLike) -> Array:
 
 
 Point = tuple[float, float]
+Mask = NDArray[np.bool_]
 
 
 class Priority(IntEnum):
@@ -396,14 +397,11 @@ class Wall(Obstacle):
         """See `Obstacle.bounds`; `numbers` and `offsets` as there.
 
         A wall of length L is nearer than rho within sqrt(L^2/4 + L rho) of its middle, along the wall, and
-        within sqrt(l rho - l^2/4) across, with l = min(L, 2 rho).
+        within sqrt(l rho - l^2/4) across, with l = min(L, 2 rho): no farther than rho and sqrt(L rho).
         """
         ends = numbers.reshape(-1, 2, 2)
         length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-        side = np.minimum(length, 2 * offsets)
-        beyond = np.sqrt(length**2 / 4 + length * offsets) - length / 2
-        across = np.sqrt(side * offsets - side**2 / 4)
-        reach = np.maximum(beyond, across)[:, None]
+        reach = np.minimum(offsets, np.sqrt(length * offsets))[:, None]
         return ends.min(axis=1) - reach, ends.max(axis=1) + reach
 
     @staticmethod
@@ -474,17 +472,15 @@ class Path(NamedTuple):
     points : shape (k+1, 2) [m].
     times : from now, shape (k+1,) [s].
     bows : by which it leaves a uniform motion between two points at most, shape (k,) [m].
-    asides : by which it leaves the straight line between two points at most, shape (k,) [m].
     """
 
     points: Array
     times: Array
     bows: Array
-    asides: Array
 
     def joined(self, later: Path) -> Path:
         """This path, and then a `later` one, which begins where and when this one ends."""
-        rest = later.points[1:], later.times[1:], later.bows, later.asides
+        rest = later.points[1:], later.times[1:], later.bows
         return Path._make(map(np.concatenate, zip(self, rest, strict=True)))
 
 
@@ -540,15 +536,13 @@ class Obstacles(NamedTuple):
         """These, and then the `others`."""
         return Obstacles(self.groups + others.groups, self.r_robot)
 
-    def chosen(self, near: Sequence[int]) -> Obstacles:
-        """Those with the numbers `near`, which increase."""
-        groups, first = list[Group](), 0
+    def chosen(self, is_near: Mask) -> Obstacles:
+        """Those that are near, by whether each of them is, shape (n,)."""
+        groups, rest = list[Group](), is_near
         for kind, numbers, offsets in self.groups:
-            last = first + len(offsets)
-            own = [i - first for i in near if first <= i < last]
-            if own:
+            own, rest = np.split(rest, [len(offsets)])
+            if own.any():
                 groups.append(Group(kind, numbers[own], offsets[own]))
-            first = last
         return self._replace(groups=tuple(groups))
 
     @property
@@ -585,9 +579,7 @@ class Obstacles(NamedTuple):
         """Euclidean gaps of the robot's disc, shape (n, ...) [m]; `x`, `y` and `t` as of `h`."""
         return self._collect("gap", x, y, t) - self.r_robot
 
-    def bound(
-        self, path: Path, *, is_barrier: bool = False, are_fixed: bool = False
-    ) -> tuple[Array, Array]:
+    def bound(self, path: Path, *, is_barrier: bool = False) -> tuple[Array, Array]:
         """Lower bounds of the gaps on a path, and the least gaps at its points but the first, shape (n,) [m].
 
         Parameters
@@ -595,7 +587,6 @@ class Obstacles(NamedTuple):
         path : of the robot.
         is_barrier : True: of h instead of the gap; not of walls, whose h may change faster than the robot
             moves.
-        are_fixed : True: the obstacles stand still, so that only the line matters, not the time.
 
         Notes
         -----
@@ -614,13 +605,13 @@ class Obstacles(NamedTuple):
         gaps = (self.h if is_barrier else self.gaps)(x, y, t)
         speeds = np.concatenate([g.kind.speeds(g.numbers) for g in self.groups])
         reach = np.hypot(np.diff(x), np.diff(y)) + speeds[:, None] * np.diff(t)
-        bows = np.repeat(path.asides if are_fixed else path.bows, _PARTS)
+        bows = np.repeat(path.bows, _PARTS)
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
         seen = gaps[:, _PARTS::_PARTS]
         return lower.min(axis=1, initial=np.inf), seen.min(axis=1, initial=np.inf)
 
-    def find_near(self, x: float, y: float, reach: float) -> list[int]:
-        """Places of the obstacles whose way s may be at most `reach` from (`x`, `y`) [m].
+    def find_near(self, x: float, y: float, reach: float) -> Mask:
+        """Whether the way s to each obstacle may be at most `reach` from (`x`, `y`) [m], shape (n,).
 
         An obstacle with the velocity w can be left out while its way s >= r_robot + margin + (v + w) (T +
         dt/gamma), with the horizon T, and dt and gamma of the longest step: then its rows hold whatever a
@@ -634,7 +625,7 @@ class Obstacles(NamedTuple):
 
         A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m.
         """
-        return np.flatnonzero(0.7 * self._collect("gap", x, y, 0.0) <= reach).tolist()
+        return np.asarray(0.7 * self._collect("gap", x, y, 0.0) <= reach)
 
     def _collect(
         self, formula: str, x: Any, y: Any, t: Any, *, is_barrier: bool = False

@@ -46,7 +46,7 @@ from numpy.typing import NDArray
 
 from ..core.checks import Array
 from .obstacles import Priority, find_bodies
-from .problem import LinearProblem, Question, limit_speed
+from .problem import LinearProblem, Question, build_horizon, follow_velocities
 from .settings import TOLERANCE, MPCSettings
 
 # The iterations end if the change of the inputs is smaller, as a vector [m/s2].
@@ -327,7 +327,8 @@ class Planner:
         self._on_speed[:] = program.multipliers
         inputs = np.minimum(np.maximum(program.inputs, -s.a_max), s.a_max)
         if not is_converged:
-            limit_speed(s, question.state[2:], inputs)
+            states = build_horizon(s).states(np.array(question.state), inputs)
+            inputs = follow_velocities(s, question.state[2:], states[1:, 2:])
         program.inputs[:] = inputs
         if is_relaxed or not is_converged:
             program.evaluate()

@@ -110,51 +110,35 @@ def build_horizon(settings: MPCSettings) -> Horizon:
     return Horizon(times, past * dt * (ends[:, None] - ends + dt / 2), past * dt)
 
 
+def follow_velocities(
+    s: MPCSettings, velocity: Sequence[float], wanted: Array
+) -> Array:
+    """Inputs that bring a robot as near as it can to the velocities `wanted`, shape (N, 2) [m/s2].
+
+    The velocity changes on a straight line, and at no time the robot is too fast, by the settings `s`; one
+    that is too fast now slows down as it can.
+
+    Parameters
+    ----------
+    s : settings of the controller.
+    velocity : of the robot now [m/s].
+    wanted : at the end of each step, shape (N, 2) [m/s].
+    """
+    v, slowest, plan = velocity, hypot(*velocity), list[Point]()
+    ends = zip(wanted.tolist(), s.step_lengths, s.times[1:], strict=True)
+    for (wx, wy), length, time in ends:
+        dt, limit = s.dt * length, max(s.v_max, slowest - s.a_max * time)
+        share = min(1.0, limit / (hypot(wx, wy) or 1.0))
+        dx, dy = share * wx - v[0], share * wy - v[1]
+        seconds = max(dt, abs(dx) / s.a_max, abs(dy) / s.a_max)
+        plan.append((dx / seconds, dy / seconds))
+        v = v[0] + dt * dx / seconds, v[1] + dt * dy / seconds
+    return np.array(plan).clip(-s.a_max, s.a_max)
+
+
 def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
     """Inputs that bring the robot from `velocity` to rest soonest on its path, within `s`, shape (N, 2)."""
-    vx, vy = velocity
-    plan = list[tuple[float, float]]()
-    for dt in (s.dt * length for length in s.step_lengths):
-        time = max(dt, max(abs(vx), abs(vy)) / s.a_max)
-        plan.append((-vx / time, -vy / time))
-        vx, vy = vx - dt * vx / time, vy - dt * vy / time
-    return np.array(plan)
-
-
-def plan_along(s: MPCSettings, state: Sequence[float], points: Array) -> Array:
-    """Inputs with which a robot in this `state` follows `points` at the times of `s`, shape (N, 2) [m/s2]."""
-    x, y, vx, vy = state
-    plan = list[tuple[float, float]]()
-    for (px, py), length in zip(points[1:].tolist(), s.step_lengths, strict=True):
-        dt = s.dt * length
-        wanted = (px - x) / dt, (py - y) / dt
-        ax, ay = _approach(s, (vx, vy), wanted, dt, s.v_max)
-        plan.append((ax, ay))
-        x, y = x + dt * vx + dt**2 / 2 * ax, y + dt * vy + dt**2 / 2 * ay
-        vx, vy = vx + dt * ax, vy + dt * ay
-    return np.array(plan)
-
-
-def limit_speed(s: MPCSettings, velocity: Sequence[float], inputs: Array) -> None:
-    """Change `inputs`, shape (N, 2), so that a robot with this `velocity` is at no time too fast, by `s`.
-
-    A robot that is too fast now slows down as it can.
-    """
-    (vx, vy), slowest = velocity, hypot(*velocity)
-    for control, length, time in zip(inputs, s.step_lengths, s.times[1:], strict=True):
-        dt, limit = s.dt * length, max(s.v_max, slowest - s.a_max * time)
-        ax, ay = control.tolist()
-        control[:] = _approach(s, (vx, vy), (vx + dt * ax, vy + dt * ay), dt, limit)
-        vx, vy = vx + dt * control[0], vy + dt * control[1]
-
-
-def _approach(
-    s: MPCSettings, velocity: Point, wanted: Point, dt: float, limit: float
-) -> Point:
-    """The control that brings a robot from a `velocity` nearest to the one `wanted`, up to a `limit`."""
-    share = min(1.0, limit / (hypot(*wanted) or 1.0))
-    ax, ay = ((share * w - v) / dt for v, w in zip(velocity, wanted, strict=True))
-    return max(-s.a_max, min(ax, s.a_max)), max(-s.a_max, min(ay, s.a_max))
+    return follow_velocities(s, velocity, np.zeros((s.N, 2)))
 
 
 class Condition(NamedTuple):

@@ -205,8 +205,8 @@ class Step:
     def path(self) -> Path:
         """Where the disc goes within this step."""
         dt = self.scene.settings.dt
-        bows = np.full((2, 1), self._sideways * dt**2 / 8)
-        return Path(self.predicted[:2, :2], np.array([0.0, dt]), *bows)
+        bows = np.full(1, self._sideways * dt**2 / 8)
+        return Path(self.predicted[:2, :2], np.array([0.0, dt]), bows)
 
     @property
     def _sideways(self) -> float:

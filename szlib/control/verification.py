@@ -135,7 +135,8 @@ def verify_step(step: Any) -> Report:
     way = _sample(np.array(step.asked.state), step.inputs, s.dt * lengths)
     h = _measure(step.asked, x[:, :2], way.times[::PIECES], is_barrier=True)
     residual = h[:, 1:] - (1 - s.gamma) ** lengths * h[:, :-1]
-    rows = list_rows(step.asked, x, h, _measure_bodies(step.asked, x))
+    gaps = _measure(step.asked, x[:, :2], way.times[::PIECES])
+    rows = list_rows(step.asked, x, h, gaps[: len(scene.people)] - s.body_gap)
     worst = _find_worst(step.asked, (each for each in rows if each.is_hard(s)))
     path = step.carry(way).points
     within = path[:_SAMPLES], way.times[:_SAMPLES]
@@ -270,17 +271,6 @@ def _measure(
         margin = each.margin(s) if is_barrier else 0.0
         found.append(measured - s.r_robot - margin)
     return np.reshape(found, (-1, len(points)))
-
-
-def _measure_bodies(scene: Any, x: Array) -> Array:
-    """Gaps to the bodies of people less `body_gap`, at the states `x` of a plan, shape (n, N+1) [m]."""
-    s, times = scene.settings, np.array(scene.settings.times)
-    found = [
-        np.hypot(*(x[:, :2] - _find_places(person, times, s, True)[0]).T)
-        for person in scene.people
-    ]
-    gaps = np.reshape(found, (-1, len(x)))
-    return np.asarray(gaps - BODY_RADIUS - s.r_robot - s.body_gap)
 
 
 def _find_places(

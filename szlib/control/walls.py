@@ -59,15 +59,6 @@ def read_walls(walls: Any) -> Array:
     return np.asarray(ends[line[:-1] == line[1:]])
 
 
-class Walls(np.ndarray[Any, np.dtype[np.float64]]):
-    """Segments, shape (n, 2, 2) [m], that enclose the areas `solids`; a copy does not."""
-
-    solids: Any
-
-    def __reduce__(self) -> Any:
-        return _enclose, (np.asarray(self), self.solids)
-
-
 def find_solids(walls: Any) -> Any:
     """The union of the areas that `walls` enclose, of Shapely; None if there are none."""
     found = [area for _, area in _find_shapes(walls) if area is not None]
@@ -95,7 +86,7 @@ def _find_shapes(walls: Any) -> Iterator[tuple[Any, Any]]:
             "numbers by np.reshape(walls, (-1, 2, 2))"
         )
         require(is_line, "a wall", given, expected, SolverError)
-        yield np.ravel(shapely.linestrings(corners)), getattr(walls, "solids", None)
+        yield np.ravel(shapely.linestrings(corners)), None
 
 
 def _is_corner(part: Any) -> bool:
@@ -108,7 +99,7 @@ def walls_from_map(
     *,
     simplify: float = 0.05,
     unknown: bool = False,
-) -> Walls:
+) -> Array:
     """Read the map of ROS map_server in the YAML file `path`: the outlines of what is occupied.
 
     Parameters
@@ -120,8 +111,7 @@ def walls_from_map(
 
     Returns
     -------
-    Segments, shape (n, 2, 2) [m], in the map's frame; for `MPCCBF(walls=...)`, which also learns from them
-    that what they enclose is solid.
+    Segments, shape (n, 2, 2) [m], in the map's frame; for `MPCCBF(walls=...)`.
 
     Raises
     ------
@@ -181,7 +171,7 @@ def walls_from_grid(
     origin: ArrayLike = (0.0, 0.0, 0.0),
     *,
     simplify: float = 0.05,
-) -> Walls:
+) -> Array:
     """Find the outlines of the occupied cells of a grid, as segments, shape (n, 2, 2) [m].
 
     Parameters
@@ -217,11 +207,4 @@ def walls_from_grid(
     outlines = shapely.union_all(shapely.box(begin, row, end, row + 1))
     c, s = side * cos(yaw), side * sin(yaw)
     turn = [c, -s, s, c, x, y]
-    solids = affine_transform(shapely.simplify(outlines, within / side), turn)
-    return _enclose(read_walls(solids), solids)
-
-
-def _enclose(segments: Array, solids: Any) -> Walls:
-    walls = segments.copy().view(Walls)
-    walls.solids = solids
-    return walls
+    return read_walls(affine_transform(shapely.simplify(outlines, within / side), turn))

@@ -35,13 +35,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import Obstacles, ellipse_formula, find_places
+from .obstacles import Mask, Obstacles, Point, ellipse_formula, find_places
 from .people import STANDING_SPEED
 from .settings import MPCSettings
 
-Point = tuple[float, float]
 Cells = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 CELL = 0.15
 """Side of a cell [m] (assumed)."""
 MOST_CELLS = 250_000

@@ -88,7 +88,7 @@ def test_no_move_makes_an_obstacle_out_of_reach_matter() -> None:
         table = Obstacles.of([each], S)
         half = each.numbers[2] if isinstance(each, Wall) else 1.0
         points = rng.uniform(-12 - half, 12 + half, (3000, 2)).tolist()
-        out = np.array([p for p in points if not table.find_near(*p, reach)])
+        out = np.array([p for p in points if not table.find_near(*p, reach).any()])
         assert len(out) > 100
         edge = out[np.argsort(np.abs(np.hypot(*out.T) - reach))][:500]
         for step in (0.0, (S.N - 1) * v * S.dt):
