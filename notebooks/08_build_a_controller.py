@@ -584,11 +584,11 @@ Markdown(
 #   (sec. 4).
 #
 # *The weights.* The paper gives none. It uses the public code of Zeng, Zhang and Sreenath (2021), which has $Q = 10\,I$,
-# $R = I$, $P = 100\,I$ and gamma = 0.4: there a velocity costs ten times as much as here. `MPCSettings.reference_code()` has
-# these numbers. **What do you think?** With these weights, and our gamma, is the robot sooner at its goal, or later?
+# $R = I$, $P = 100\,I$ and gamma = 0.4: there a velocity costs ten times as much as here.
+# **What do you think?** With these weights, and our gamma, is the robot sooner at its goal, or later?
 
 # %%
-code = szlib.MPCSettings.reference_code(gamma=gamma)
+code = szlib.MPCSettings.paper(gamma=gamma, Q=(10,) * 4, R=(1,) * 2, P=(100,) * 4)
 for name, scene in szlib.SCENARIOS.items():
     runs = [
         szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=each))

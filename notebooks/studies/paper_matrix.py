@@ -69,12 +69,14 @@ SPEEDS = (0.7, 1.1, 1.3)
 """Slow, that of the robot's zone, and fast [m/s]."""
 PAPER = szlib.MPCSettings.paper()
 BASE = replace(PAPER, solver="sqp")
+WEIGHTS_OF_CODE: dict[str, Any] = {"Q": (10.0,) * 4, "R": (1.0,) * 2, "P": (100.0,) * 4}
+"""Of the public code that the paper uses (Zeng, Zhang and Sreenath, MPC-CBF, examples/test.m)."""
 ROBOTS = {
     PAPERS: PAPER,
     **{f"gamma = {gamma:g}": replace(BASE, gamma=gamma) for gamma in (0.02, 0.1, 0.2, 0.4)},
     **{f"N_h = {n}": replace(BASE, N_h=n) for n in (1, 4, 8)},
-    "weights of its code": szlib.MPCSettings.reference_code(solver="sqp", gamma=BASE.gamma),
-    "weights and gamma of its code": szlib.MPCSettings.reference_code(solver="sqp"),
+    "weights of its code": replace(BASE, **WEIGHTS_OF_CODE),
+    "weights and gamma of its code": replace(BASE, gamma=0.4, **WEIGHTS_OF_CODE),
     "ours": szlib.MPCSettings(time_limit=np.inf),
 }
 """The paper's controller, with one change each (by our solver, which is faster); and ours."""

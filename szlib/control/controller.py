@@ -100,9 +100,7 @@ class DoubleIntegrator:
         """The state `own` itself."""
         return own
 
-    def advance(self, own: Array, control: Array, dt: float) -> Array:
-        """State after `own` when `control` was held for `dt` [s]: see `advance` of this module."""
-        return advance(own, control, dt)
+    advance = staticmethod(advance)
 
 
 class Controller:
@@ -218,32 +216,67 @@ class StepClock:
     ----------
     now : time of the present step [s].
     has_begun : True if a control was commanded.
+    fault : what is wrong with the times of this step, in words; "" if nothing is.
     """
 
     def __init__(self, dt: float) -> None:
         self.now, self.has_begun = 0.0, False
-        self._dt, self._elapsed, self._back = dt, dt, 0.0
+        self._dt, self._elapsed, self.fault = dt, dt, ""
         n_held = 100 * ceil(OLDEST_STATE / dt)
         self._held = deque[tuple[Array, float]](maxlen=n_held)
         self._periods, self._called = deque[float](maxlen=RATE_STEPS), 0.0
         self._goal, self._nearest = (inf, inf), inf
         self._remaining, self._waited = inf, 0.0
 
-    def tick(self, now: float | None, stamps: ArrayLike | None) -> None:
-        """Begin a step at the time `now` [s]; None: `dt` after the last, which no `stamps` can refer to."""
-        is_known, expected = now is not None, "given with `stamps`, by the same clock"
-        require(is_known or stamps is None, "now", now, expected, SolverError)
-        last, called = self.now, perf_counter()
+    def tick(self, now: float | None, stamps: ArrayLike | None, memory: float) -> None:
+        """Begin a step.
+
+        Parameters
+        ----------
+        now : time of the step [s]; None: `dt` after the last, which no `stamps` can refer to.
+        stamps : when people were measured [s].
+        memory : time for which a tracker remembers people [s].
+        """
+        is_timed, last, called = now is None, self.now, perf_counter()
+        expected, faults = "given with `stamps`, by the same clock", list[str]()
+        require(not is_timed or stamps is None, "now", now, expected, SolverError)
         if now is not None:
             self.now = check_finite("now", now)
         elif self.has_begun:
             self.now += self._dt
         if self.has_begun:
-            self._back = max(0.0, last - self.now)
-            self._elapsed = self._dt if self._back else self.now - last
+            back = max(0.0, last - self.now)
+            if back:
+                faults.append(
+                    f"the clock went back by {back:.3g} s; nobody is forgotten"
+                )
+            self._elapsed = self._dt if back else self.now - last
             self._held.append((self._control, self._elapsed))
-            self._periods.append(self._elapsed if is_known else called - self._called)
-        self._called, self._is_timed = called, not is_known
+            self._periods.append(called - self._called if is_timed else self._elapsed)
+        self._called = called
+        if stamps is not None:
+            late = np.abs(np.asarray(stamps, float) - self.now).max(initial=0.0)
+            if late > memory:
+                faults.append(
+                    f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s only"
+                )
+        self.fault = "; ".join(faults + self._check_rate(is_timed))
+
+    def _check_rate(self, is_timed: bool) -> list[str]:
+        """What is wrong with the rate of the steps, by `now` or, if it `is_timed`, by a clock of our own."""
+        periods, dt = self._periods, self._dt
+        low, high = REAL_TIME if is_timed else (0.0, inf)
+        if len(periods) < RATE_STEPS or not low <= periods[-1] / dt <= high:
+            return []
+        period = median_low(periods)
+        off = min(abs(period - dt), abs(periods[-1] - dt))
+        is_even = max(periods) - min(periods) < RATE_ERROR * period
+        if off <= RATE_ERROR * dt or (is_timed and not is_even):
+            return []
+        return [
+            f"steps come every {period:.3g} s, not every dt = {dt:g} s: gamma is per dt"
+            + "; give `now`, or call every dt" * is_timed
+        ]
 
     def hold(self, control: Array) -> None:
         """End a step: the robot holds `control` until the next one."""
@@ -280,28 +313,3 @@ class StepClock:
         if self._waited < STUCK_AFTER or remaining <= PROGRESS or approaches:
             return 0.0
         return self._waited
-
-    def describe(self, stamps: ArrayLike | None, memory: float) -> str:
-        """What is wrong with the times of this step, with the `stamps` of people and a tracker's `memory`."""
-        found, periods, dt = list[str](), self._periods, self._dt
-        if self._back:
-            found.append(
-                f"the clock went back by {self._back:.3g} s; nobody is forgotten"
-            )
-        if stamps is not None:
-            late = np.abs(np.asarray(stamps, float) - self.now).max(initial=0.0)
-            if late > memory:
-                found.append(
-                    f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s only"
-                )
-        low, high = REAL_TIME if self._is_timed else (0.0, inf)
-        if len(periods) == RATE_STEPS and low <= periods[-1] / dt <= high:
-            period = median_low(periods)
-            off = min(abs(period - dt), abs(periods[-1] - dt))
-            is_even = max(periods) - min(periods) < RATE_ERROR * period
-            if off > RATE_ERROR * dt and (is_even or not self._is_timed):
-                found.append(
-                    f"steps come every {period:.3g} s, not every dt = {dt:g} s: gamma is per dt"
-                    + "; give `now`, or call every dt" * self._is_timed
-                )
-        return "; ".join(found)

@@ -38,7 +38,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from math import dist, hypot, inf
 from threading import get_ident
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 from warnings import catch_warnings
 
 import numpy as np
@@ -56,6 +56,7 @@ from ..core.errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .controller import Controller, StepClock, find_stopping_path
 from .obstacles import (
+    Bound,
     Group,
     Mask,
     Obstacle,
@@ -91,27 +92,6 @@ from .ways import Heading, WayFinder, find_target
 
 _FEW = 24  # up to this number all obstacles are in the problem, of more those that are near
 _BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
-
-
-class Bound(NamedTuple):
-    """How near the robot comes to obstacles.
-
-    Attributes
-    ----------
-    lower : lower bound of the gaps on the way [m].
-    seen : the least of these gaps at points of the way [m].
-    """
-
-    lower: float = inf
-    seen: float = inf
-
-    @property
-    def is_safe(self) -> bool:
-        """Whether the robot touches none of them."""
-        return bool(self.lower >= -TOLERANCE)
-
-
-_FAR = Bound()
 
 
 class MPCCBF(Controller):
@@ -281,7 +261,7 @@ class MPCCBF(Controller):
         """
         began, clock = perf_counter(), self._clock
         self._check_thread()
-        clock.tick(now, stamps)
+        clock.tick(now, stamps, self.tracker.memory)
         age = check_number("state_age", state_age)
         x, towards = self._locate(state, check_point("goal", goal), age)
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
@@ -304,7 +284,7 @@ class MPCCBF(Controller):
             way_length=heading.length,
             ways=heading.ways,
             stuck=clock.time_without_progress(remaining, towards),
-            clock=clock.describe(stamps, self.tracker.memory),
+            clock=clock.fault,
         )
         clock.hold(step.control)
         return step
@@ -382,8 +362,8 @@ class MPCCBF(Controller):
             return False, (True, True)
         bodies = find_bodies(scene.zones, self.settings)
         path = self._carry(find_stopping_path(state, control, s))
-        wall = _FAR if is_wall_far else self._bound_walls(path)
-        body = _FAR if is_body_far else self._bound_bodies(bodies, path)
+        wall = Bound() if is_wall_far else self._walls_near.bound(path)
+        body = Bound() if is_body_far else self._bound_bodies(bodies, path)
         walls_safe, is_safe = wall.is_safe, body.is_safe
         if not is_safe:
             followed = self._carry(self._follow_plan(scene, plan.inputs))
@@ -392,7 +372,7 @@ class MPCCBF(Controller):
             return False, (walls_safe, walls_safe and is_safe)
         braking = plan_braking(s, state[2:])[0]
         path = self._carry(find_stopping_path(state, braking, s))
-        rest = self._bound_walls(path), self._bound_bodies(bodies, path)
+        rest = self._walls_near.bound(path), self._bound_bodies(bodies, path)
         before, after = (body, rest[1]) if walls_safe else (wall, rest[0])
         if after.seen < min(-TOLERANCE, before.seen):
             return False, (walls_safe, False)
@@ -431,24 +411,19 @@ class MPCCBF(Controller):
         """The way of the disc, if the point that is planned for goes along a `path`."""
         return path
 
-    def _bound_walls(self, path: Path) -> Bound:
-        """How near the disc comes to everything fixed on a `path` on which it comes to rest."""
-        lower, seen = self._walls_near.bound(path)
-        return Bound(lower.min(initial=inf), seen.min(initial=inf))
-
     def _bound_bodies(self, bodies: Obstacles, path: Path) -> Bound:
         """How near the disc comes to `bodies`, or towards those that it overlaps, while it moves."""
         begin = path.points[0]
         if np.hypot(*np.ptp(path.points, axis=0)) <= AT_REST * self._s.dt:
-            return _FAR
-        lower, seen = bodies.bound(path)
+            return Bound()
         overlaps = bodies.gaps(*begin) < -TOLERANCE
+        bound = bodies.chosen(~overlaps).bound(path)
         if overlaps.any():
-            places = bodies.groups[0].numbers[:, :2]
-            towards = ((places - begin) @ (path.points - begin).T).max(axis=1)
-            parting = np.where(towards > 0, -towards, inf)
-            lower, seen = (np.where(overlaps, parting, each) for each in (lower, seen))
-        return Bound(lower.min(initial=inf), seen.min(initial=inf))
+            places = bodies.groups[0].numbers[overlaps, :2]
+            towards = float(((places - begin) @ (path.points - begin).T).max())
+            if towards > 0:
+                bound = min(bound, Bound(-towards, -towards))
+        return bound
 
     def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
         """Take what can matter among everything fixed. Looked for once a metre: see `Obstacles.find_near`."""
@@ -494,9 +469,7 @@ class MPCCBF(Controller):
         s, (x, y, vx, vy), goal = self._s, scene.state, scene.goal
         at, heading = (x, y), None
         if route is not None:
-            corners = check_array("route", route, (..., 2))
-            is_line, expected = corners.ndim < 3, "corners, shape (m, 2)"
-            require(is_line, "route", corners.shape, expected, SolverError)
+            corners = check_array("route", route, (len(np.atleast_1d(route)), 2))
             heading = self._ways.follow(at, goal, corners)
         if not heading and (route is not None or s.lookahead < inf):
             groups = [person.group for person in scene.people]

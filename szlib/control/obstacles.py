@@ -19,7 +19,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from enum import IntEnum
 from itertools import groupby
-from math import cos, hypot, sin
+from math import cos, hypot, inf, sin
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.checks import Array, check_array, require
 from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .settings import MPCSettings
+from .settings import TOLERANCE, MPCSettings
 
 # Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre.
 SHORTEST_WALL = 1e-3
@@ -285,11 +285,6 @@ class Obstacle:
         """Speeds of obstacles of this kind with these `numbers`, shape (n, m) [m/s]; here 0."""
         return np.zeros(len(numbers))
 
-    @property
-    def is_fixed(self) -> bool:
-        """True if it belongs to the building: the robot can always stop before it."""
-        return self.priority == Priority.WALL
-
     def __repr__(self) -> str:
         return f"{self.kind} ({', '.join(f'{number:g}' for number in self.numbers)})"
 
@@ -484,6 +479,24 @@ class Path(NamedTuple):
         return Path._make(map(np.concatenate, zip(self, rest, strict=True)))
 
 
+class Bound(NamedTuple):
+    """How near the robot comes to obstacles.
+
+    Attributes
+    ----------
+    lower : lower bound of the gaps on the way [m].
+    seen : the least of these gaps at points of the way [m].
+    """
+
+    lower: float = inf
+    seen: float = inf
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether the robot touches none of them."""
+        return bool(self.lower >= -TOLERANCE)
+
+
 class Group(NamedTuple):
     """Obstacles of one kind, as a table.
 
@@ -579,8 +592,8 @@ class Obstacles(NamedTuple):
         """Euclidean gaps of the robot's disc, shape (n, ...) [m]; `x`, `y` and `t` as of `h`."""
         return self._collect("gap", x, y, t) - self.r_robot
 
-    def bound(self, path: Path, *, is_barrier: bool = False) -> tuple[Array, Array]:
-        """Lower bounds of the gaps on a path, and the least gaps at its points but the first, shape (n,) [m].
+    def bound(self, path: Path, *, is_barrier: bool = False) -> Bound:
+        """Lower bound of the gaps on a path, and the least gap at its points but the first.
 
         Parameters
         ----------
@@ -595,7 +608,7 @@ class Obstacles(NamedTuple):
         robot leaves a uniform motion by at most the bow.
         """
         if not self.groups:
-            return np.zeros(0), np.zeros(0)
+            return Bound()
         n = len(path.bows)
         parts = np.linspace(0.0, n, n * _PARTS + 1)
         x, y, t = (
@@ -607,8 +620,7 @@ class Obstacles(NamedTuple):
         reach = np.hypot(np.diff(x), np.diff(y)) + speeds[:, None] * np.diff(t)
         bows = np.repeat(path.bows, _PARTS)
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
-        seen = gaps[:, _PARTS::_PARTS]
-        return lower.min(axis=1, initial=np.inf), seen.min(axis=1, initial=np.inf)
+        return Bound(lower.min(), gaps[:, _PARTS::_PARTS].min())
 
     def find_near(self, x: float, y: float, reach: float) -> Mask:
         """Whether the way s to each obstacle may be at most `reach` from (`x`, `y`) [m], shape (n,).

@@ -18,6 +18,7 @@ A sensor is noisy and late, and loses people. By the ids of people,
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -181,8 +182,7 @@ def predict(
     rows = check_array("people", people, (..., 4)).reshape(-1, 4).tolist()
     n, spreads = len(rows), check_array("spread", spread, (...,))
     positions = check_array("positions", positions, (n, np.size(times), 2))
-    if not spreads.ndim:
-        spreads = np.full(n, spread)
+    spreads = spreads if spreads.ndim else np.full(n, spreads)
     expected = f"a number, or one for each of {n} people"
     require(len(spreads) == n, "spread", spreads.shape, expected, SolverError)
     return [
@@ -363,9 +363,7 @@ class Tracker:
                 people = np.asarray(people, float)
             names = [getattr(each, "id", None) for each in people]
             names = names if ids is None else list(ids)
-            given = dict.fromkeys(names, 0)
-            for name in names:
-                given[name] += 1
+            given = Counter(names)
             times = [now] * len(people)
             if stamps is not None:
                 times = np.full(len(people), stamps, float).tolist()

@@ -264,12 +264,9 @@ class Planner:
         """Forget the multipliers of the speed limit: they save time, and change answers by rounding only."""
         self._on_speed = np.zeros(self.settings.N)
 
-    def __getstate__(self) -> tuple[MPCSettings, Array]:
-        return self.settings, self._on_speed
-
-    def __setstate__(self, state: tuple[MPCSettings, Array]) -> None:
-        Planner.__init__(self, state[0])
-        self._on_speed = state[1].copy()
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the programs, which are built again."""
+        return {**self.__dict__, "_programs": {}}
 
     def plan(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, from a `guess`, shape (N, 2) [m/s2].

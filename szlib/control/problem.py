@@ -366,8 +366,8 @@ def solve_by_ipopt(
     guess : inputs to begin with, shape (N, 2) [m/s2].
     """
     s, groups = settings, question.barriers.groups
-    shapes = tuple((g.kind, len(g.offsets), g.numbers.shape[1]) for g in groups)
-    numbers = [np.column_stack([g.numbers, g.offsets]).ravel() for g in groups]
+    shapes = tuple((kind, *numbers.shape) for kind, numbers, _ in groups)
+    numbers = [np.column_stack(group[1:]).ravel() for group in groups]
     given = [*question.state, *question.target, *question.last]
     with _CALL_LOCK:
         solver = _build_ipopt(s, shapes)

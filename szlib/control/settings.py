@@ -22,23 +22,16 @@ Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest"]
 _CHOICES = {"margin": Margin, "pass_side": Side, "solver": Solver, "terminal": Terminal}
 _COUNTS = "N", "N_h", "max_iterations"
-_LIMITS = "lookahead", "decay_price", "zone_price", "time_limit", "deadline"
-# Ranges of numbers: as a check, in words, and the settings that must lie in it.
-_RANGES: tuple[tuple[Callable[[Array], Any], str, tuple[str, ...]], ...] = (
-    (
-        lambda v: v > 0,
-        "positive",
-        ("dt", "R", "a_max", "v_max", "zone_speed", *_LIMITS),
-    ),
-    (
-        lambda v: v >= 0,
-        "at least 0",
-        ("Q", "P", "jerk_weight", "r_robot", "eps", "body_gap"),
-    ),
-    (lambda v: (v > 0) & (v <= 1), "in (0, 1]", ("gamma",)),
-    (lambda v: (v >= 0) & (v <= 0.5), "in [0, 0.5]", ("head_on_share",)),
+# settings that may be infinite
+_LIMITS = "lookahead decay_price zone_price time_limit deadline"
+# Ranges of numbers: as a check, in words, and the names of the settings that must lie in it.
+_RANGES: tuple[tuple[Callable[[Array], Any], str, str], ...] = (
+    (lambda v: v > 0, "positive", f"dt R a_max v_max zone_speed {_LIMITS}"),
+    (lambda v: v >= 0, "at least 0", "Q P jerk_weight r_robot eps body_gap"),
+    (lambda v: (v > 0) & (v <= 1), "in (0, 1]", "gamma"),
+    (lambda v: (v >= 0) & (v <= 0.5), "in [0, 0.5]", "head_on_share"),
 )
-# What the paper has instead of the default, and the sources of the defaults that are not the paper's.
+# What the paper has instead of the default, and the settings whose default is not the paper's, by source.
 _PAPER: dict[str, Any] = {
     "margin": "paper",
     "head_on_share": 0.0,
@@ -46,28 +39,10 @@ _PAPER: dict[str, Any] = {
     "solver": "ipopt",
     "time_limit": inf,
 }
-# Of the public code that the paper uses (Zeng, Zhang and Sreenath, MPC-CBF, examples/test.m).
-_CODE: dict[str, Any] = {
-    "gamma": 0.4,
-    "Q": (10.0,) * 4,
-    "R": (1.0,) * 2,
-    "P": (100.0,) * 4,
-}
 _SOURCES = {
-    "gamma": "tuned",
-    "Q": "assumed",
-    "R": "assumed",
-    "P": "assumed",
-    "a_max": "assumed",
-    "margin": "measured",
-    "pass_side": "assumed",
-    "head_on_share": "assumed",
-    "body_gap": "assumed",
-    "guard": "measured",
-    "solver": "measured",
-    "max_iterations": "assumed",
-    "time_limit": "assumed",
-    "deadline": "assumed",
+    "tuned": "gamma",
+    "measured": "margin guard solver",
+    "assumed": "Q R P a_max pass_side head_on_share body_gap max_iterations time_limit deadline",
 }
 
 
@@ -167,9 +142,9 @@ class MPCSettings:
     def __post_init__(self) -> None:
         put = partial(object.__setattr__, self)
         for holds, expected, names in _RANGES:
-            for name in names:
+            for name in names.split():
                 value, shape = getattr(self, name), np.shape(getattr(MPCSettings, name))
-                if name in _LIMITS and value == inf:
+                if name in _LIMITS.split() and value == inf:
                     continue
                 numbers = check_array(name, value, shape)
                 require(holds(numbers).all(), name, value, expected, SolverError)
@@ -209,23 +184,6 @@ class MPCSettings:
         'ipopt'
         """
         return cls(**_PAPER | changes)
-
-    @classmethod
-    def reference_code(cls, **changes: Any) -> MPCSettings:
-        """The paper's controller with the numbers of the code that it uses, with `changes` by name.
-
-        The paper gives neither gamma nor weights. The public code of Zeng, Zhang and Sreenath has Q = 10 I,
-        R = I, P = 100 I and gamma = 0.4: its weights of velocities are ten times those of `paper`. That
-        code also has dt = 0.2 s and limits of each axis; here they are the paper's.
-
-        Examples
-        --------
-        >>> import szlib
-        >>> settings = szlib.MPCSettings.reference_code()
-        >>> settings.Q, settings.badges()["Q"]
-        ((10.0, 10.0, 10.0, 10.0), 'reference code')
-        """
-        return cls.paper(**_CODE | changes)
 
     @property
     def gamma_rate(self) -> float:
@@ -287,8 +245,7 @@ class MPCSettings:
     def badges(self) -> dict[str, str]:
         """The source of each value, by name.
 
-        "paper", "assumed", "measured", "tuned" (on the paper's four scenarios), "reference code" (see
-        `reference_code`), or "chosen" by the user.
+        "paper", "assumed", "measured", "tuned" (on the paper's four scenarios), or "chosen" by the user.
         """
         return {each.name: self._find_source(each.name) for each in fields(self)}
 
@@ -297,5 +254,8 @@ class MPCSettings:
         if value == _PAPER.get(name):
             return "paper"
         if value == getattr(MPCSettings, name):
-            return _SOURCES.get(name, "paper")
-        return "reference code" if value == _CODE.get(name) else "chosen"
+            of_name = (
+                each for each, names in _SOURCES.items() if name in names.split()
+            )
+            return next(of_name, "paper")
+        return "chosen"

@@ -66,11 +66,6 @@ class Scene(NamedTuple):
         """What has barriers: zones, then what is fixed."""
         return self.zones.joined(self.fixed)
 
-    @property
-    def bodies(self) -> Obstacles:
-        """The bodies of people."""
-        return find_bodies(self.zones, self.settings)
-
     def find_standing_h(self, x: Any, y: Any) -> Array:
         """Barriers at `x`, `y`, shape (obstacles, ...) [m]; inf for people who walk: they leave it free."""
         h = self.barriers.h(x, y)
@@ -121,10 +116,9 @@ class Scene(NamedTuple):
             return "its plan is not feasible"
         if (then < -TOLERANCE).any():
             return f"it comes too close to {self.name(int(then.argmin()))}"
-        gaps, _ = barriers.bound(path)
-        h, _ = self.zones.bound(path, is_barrier=True)
-        least = min(gaps.min(initial=inf), h.min(initial=inf) + self.settings.eps)
-        return "" if least >= -TOLERANCE else "its disc overlaps a body or a wall"
+        h = self.zones.bound(path, is_barrier=True).lower + self.settings.eps
+        is_safe = min(barriers.bound(path).lower, h) >= -TOLERANCE
+        return "" if is_safe else "its disc overlaps a body or a wall"
 
 
 @dataclass(frozen=True, repr=False)

@@ -188,16 +188,17 @@ def _sample(state: Array, inputs: Array, lasts: Array, rests_by: Any = None) -> 
 
     Then it brakes as hard as it can, with the settings `rests_by`.
     """
+    if rests_by:
+        v, dt = state[2:] + lasts @ inputs, rests_by.dt
+        stop = np.abs(v).max() / rests_by.a_max
+        n = min(int(np.ceil(stop / dt - ROUNDING)), _SAMPLES)
+        stop = max(dt, stop)
+        inputs = np.concatenate([inputs, np.tile(-v / stop, (n, 1))])
+        lasts = np.append(lasts, np.full(n, stop / max(1, n)))
     points, times, states = [state[None, :2]], [np.zeros(1)], [state]
-    todo = list(zip(inputs, lasts, strict=True))
-    s, shares = rests_by, np.linspace(0.0, 1.0, _SAMPLES)[1:]
-    while todo or (s and np.abs(states[-1][2:]).max() > 1e-9):
+    shares = np.linspace(0.0, 1.0, _SAMPLES)[1:]
+    for u, dt in zip(inputs, lasts, strict=True):
         p, v = np.split(states[-1], 2)
-        if not todo:
-            stop = np.abs(v).max() / s.a_max
-            piece = s.dt * max(1.0, np.ceil(stop / s.dt / _SAMPLES))
-            todo.append((-v / max(piece, stop), piece))
-        u, dt = todo.pop(0)
         t = dt * shares[:, None]
         points.append(p + t * v + t**2 / 2 * u)
         times.append(times[-1][-1] + t[:, 0])
@@ -211,14 +212,14 @@ def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
     Its inputs have the times `lasts`.
     """
     scene, s, is_clear = step.scene, step.asked.settings, list[bool]()
-    is_fixed = np.array([each.is_fixed for each in scene.barriers.items], bool)
+    levels = np.array([each.priority for each in scene.barriers.items], int)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
     for n in (1, s.N):
         asked = np.array(step.asked.state), step.inputs[:n], lasts[:n]
         points, times, _ = step.carry(_sample(*asked, s))
         gaps = _measure(scene, points, times, as_predicted=False)
         touches = np.asarray((gaps < -TOLERANCE).any(axis=1))
-        if n == 1 and step.walls_safe and touches[is_fixed].any():
+        if n == 1 and step.walls_safe and touches[levels == Priority.WALL].any():
             yield "the step says that it can stop before every wall; it cannot"
         moved = points[::PIECES] - points[0]
         nearer = ((places - points[0]) @ moved.T > TOLERANCE).any(axis=1)

@@ -321,24 +321,31 @@ def test_the_bound_of_a_path_is_below_every_gap_on_it_and_not_far_below(is_barri
         items = some_of_each(rng)
         # h of walls beyond their ends changes by more than the robot moves
         some = items[:2] if is_barrier else items
-        table = Obstacles.of(some, S)
-        bound, seen = table.bound(path, is_barrier=is_barrier)
         t = np.linspace(0, path.times[-1], 801)
         x, y = np.array([move(each) for each in t]).T
-        true = table.h(x, y, t) if is_barrier else table.gaps(x, y, t)
-        assert (bound <= true.min(axis=1) + 1e-9).all()
-        measure = table.h if is_barrier else table.gaps
-        at_points = measure(*path.points.T, path.times)
-        assert (seen >= at_points.min(axis=1) - 1e-9).all()
-        assert (seen <= at_points[:, 1:].min(axis=1) + 1e-9).all()
-        near = true.min(axis=1) < 0.5
-        slack += (true.min(axis=1) - bound)[near & (bound < 0)].tolist()
+        for each in some:
+            table = Obstacles.of([each], S)
+            measure = table.h if is_barrier else table.gaps
+            bound, seen = table.bound(path, is_barrier=is_barrier)
+            true, at_points = (
+                measure(x, y, t)[0],
+                measure(*path.points.T, path.times)[0],
+            )
+            assert bound <= true.min() + 1e-9
+            assert at_points.min() - 1e-9 <= seen <= at_points[1:].min() + 1e-9
+            if true.min() < 0.5 and bound < 0:
+                slack.append(true.min() - bound)
+        together = Obstacles.of(some, S).bound(path, is_barrier=is_barrier)
+        alone = [
+            Obstacles.of([each], S).bound(path, is_barrier=is_barrier) for each in some
+        ]
+        assert together == pytest.approx(np.min(alone, axis=0))
     assert len(slack) > 30 and np.median(slack) < 0.01
 
 
-def test_a_path_among_no_obstacles_has_no_bounds():
+def test_a_path_among_no_obstacles_has_no_bound():
     path = find_stopping_path((0.0, 0.0, 1.0, 0.0), np.zeros(2), S)
-    assert [each.shape for each in Obstacles((), 0.5).bound(path)] == [(0,), (0,)]
+    assert Obstacles((), 0.5).bound(path) == (np.inf, np.inf)
 
 
 # --- a half-plane, and an obstacle of a user ---------------------------------------------------------

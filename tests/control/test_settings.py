@@ -83,18 +83,6 @@ def test_the_papers_settings_are_ipopt_with_5_cm_and_no_rule_of_the_side() -> No
         szlib.MPCSettings.paper(gamma=2)
 
 
-def test_the_reference_code_has_its_weights_and_the_papers_problem() -> None:
-    paper, code = szlib.MPCSettings.paper(), szlib.MPCSettings.reference_code()
-    differing = {
-        f.name for f in fields(paper) if getattr(paper, f.name) != getattr(code, f.name)
-    }
-    assert differing == {"gamma", "Q", "P"}
-    assert (code.gamma, code.Q, code.P) == (0.4, 4 * (10.0,), 4 * (100.0,))
-    badges = code.badges()
-    assert {badges[name] for name in differing} == {"reference code"}
-    assert szlib.MPCSettings.reference_code(gamma=0.1).badges()["gamma"] == "chosen"
-
-
 def test_what_the_paper_does_not_give_is_assumed() -> None:
     s = szlib.MPCSettings.paper()
     assert (s.gamma, s.a_max, s.R) == (0.05, 1.0, (1.0, 1.0))

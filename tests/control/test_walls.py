@@ -60,10 +60,6 @@ def test_a_block_of_cells_becomes_its_outline_in_the_world(
     assert bounds(walls) == pytest.approx([-0.8, -1.75, -0.3, -0.75])
 
 
-def as_lines(walls: Any) -> Any:
-    return shapely.linestrings(np.reshape(walls, (-1, 2, 2)))
-
-
 def test_yaw_turns_the_map_about_its_origin(tmp_path: Path) -> None:
     straight = szlib.walls_from_map(write_map(tmp_path))
     turned = szlib.walls_from_map(write_map(tmp_path, origin=[-1.0, -2.0, pi / 6]))
@@ -91,9 +87,7 @@ def test_each_kind_of_cell_is_read_as_map_server_reads_it(tmp_path: Path) -> Non
         )
         walls = szlib.walls_from_map(path, unknown=unknown)
         centres = np.arange(40) + 0.5
-        solid = shapely.union_all(
-            shapely.get_parts(shapely.polygonize(as_lines(walls)))
-        )
+        solid = shapely.build_area(shapely.multilinestrings(list(walls)))
         found = set(np.flatnonzero(shapely.contains_xy(solid, centres, 1.5)).tolist())
         assert found == expected, changes
 

@@ -125,7 +125,7 @@ def test_routes_are_free_of_walls_and_nearly_as_short_as_they_can_be() -> None:
 
 
 @pytest.mark.parametrize("size", [0.05, 0.4, 1.0, 2.0, 8.0])
-def test_the_box_of_a_wall_is_the_smallest_that_holds_all_places_so_near(size) -> None:
+def test_the_box_of_a_wall_holds_all_places_so_near_and_little_more(size) -> None:
     wall = Wall(0.0, 0.0, size, 0.0)
     offset = 0.5 + wall.margin(AHEAD)
     x, y = np.meshgrid(np.linspace(-3, size + 3, 1201), np.linspace(-3, 3, 1201))
@@ -134,7 +134,7 @@ def test_the_box_of_a_wall_is_the_smallest_that_holds_all_places_so_near(size) -
     edge = max(high[0, 1], high[0, 0] - size)
     assert low[0] == pytest.approx([-edge, -edge])
     reach = max(x[inside].max() - size, y[inside].max())
-    assert reach <= edge <= reach + 0.02
+    assert reach <= edge <= 2 / 3**0.5 * reach + 0.02
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.02, 0.1])
@@ -376,7 +376,7 @@ def test_targets_of_small_robots_lie_on_this_side_of_thin_walls(radius) -> None:
 
 
 def test_a_route_of_a_wrong_shape_is_refused() -> None:
-    with pytest.raises(szlib.SolverError, match=r"route.*shape \(m, 2\)"):
+    with pytest.raises(szlib.SolverError, match="route must have shape"):
         szlib.MPCCBF(ZONE).step(START, (3.0, 0.0), route=np.zeros((2, 2, 2)))
 
 
