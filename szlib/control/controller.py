@@ -73,7 +73,8 @@ def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -
     control : (ax, ay) [m/s2].
     s : settings: dt and a_max.
     """
-    now, dt = np.array(state), s.dt
+    now = np.array(state)
+    dt = s.dt
     after = advance(now, control, dt)
     velocity = after[2:]
     fastest = float(np.abs(velocity).max())
@@ -220,13 +221,19 @@ class StepClock:
     """
 
     def __init__(self, dt: float) -> None:
-        self.now, self.has_begun = 0.0, False
-        self._dt, self._elapsed, self.fault = dt, dt, ""
+        self.now = 0.0
+        self.has_begun = False
+        self._dt = dt
+        self._elapsed = dt
+        self.fault = ""
         n_held = 100 * ceil(OLDEST_STATE / dt)
         self._held = deque[tuple[Array, float]](maxlen=n_held)
-        self._periods, self._called = deque[float](maxlen=RATE_STEPS), 0.0
-        self._goal, self._nearest = (inf, inf), inf
-        self._remaining, self._waited = inf, 0.0
+        self._periods = deque[float](maxlen=RATE_STEPS)
+        self._called = 0.0
+        self._goal = (inf, inf)
+        self._nearest = inf
+        self._remaining = inf
+        self._waited = 0.0
 
     def tick(self, now: float | None, stamps: ArrayLike | None, memory: float) -> None:
         """Begin a step.
@@ -237,8 +244,11 @@ class StepClock:
         stamps : when people were measured [s].
         memory : time for which a tracker remembers people [s].
         """
-        is_timed, last, called = now is None, self.now, perf_counter()
-        expected, faults = "given with `stamps`, by the same clock", list[str]()
+        is_timed = now is None
+        last = self.now
+        called = perf_counter()
+        expected = "given with `stamps`, by the same clock"
+        faults = list[str]()
         require(not is_timed or stamps is None, "now", now, expected, SolverError)
         if now is not None:
             self.now = check_finite("now", now)
@@ -264,7 +274,8 @@ class StepClock:
 
     def _check_rate(self, is_timed: bool) -> list[str]:
         """What is wrong with the rate of the steps, by `now` or, if it `is_timed`, by a clock of our own."""
-        periods, dt = self._periods, self._dt
+        periods = self._periods
+        dt = self._dt
         low, high = REAL_TIME if is_timed else (0.0, inf)
         if len(periods) < RATE_STEPS or not low <= periods[-1] / dt <= high:
             return []
@@ -280,13 +291,15 @@ class StepClock:
 
     def hold(self, control: Array) -> None:
         """End a step: the robot holds `control` until the next one."""
-        self._control, self.has_begun = control, True
+        self._control = control
+        self.has_begun = True
 
     def bring_forward(
         self, robot: Robot, own: Array, age: float, at_first: Array
     ) -> Array:
         """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
-        spans, expected = list[tuple[Array, float]](), f"0 to {OLDEST_STATE:g} s"
+        spans = list[tuple[Array, float]]()
+        expected = f"0 to {OLDEST_STATE:g} s"
         require(0 <= age <= OLDEST_STATE, "state_age", age, expected, SolverError)
         for control, held in reversed(self._held):
             if age <= 0:
@@ -308,8 +321,10 @@ class StepClock:
         # the clock may jump
         self._waited += min(self._elapsed, max(self._dt, OLDEST_STATE))
         if dist(goal, self._goal) > NEW_GOAL or remaining < self._nearest - PROGRESS:
-            self._nearest, self._waited = remaining, 0.0
-        self._goal, self._remaining = goal, remaining
+            self._nearest = remaining
+            self._waited = 0.0
+        self._goal = goal
+        self._remaining = remaining
         if self._waited < STUCK_AFTER or remaining <= PROGRESS or approaches:
             return 0.0
         return self._waited

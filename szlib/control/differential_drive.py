@@ -67,7 +67,8 @@ _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn o
 # turns that are tried, in this order [rad]
 _TURNS = np.array(sorted(np.linspace(-pi, pi, 33), key=abs))
 # largest turn that is asked for at once, and where a turn ends [rad]
-_TURN, _ALIGNED = (1.0, 0.2)
+_TURN = 1.0
+_ALIGNED = 0.2
 _FREE = 0.02  # h that the point needs [m]
 
 
@@ -107,7 +108,8 @@ class Unicycle:
         (x, y, theta, *_), (v, omega) = own.tolist(), control.tolist()
         half = omega * dt / 2
         move = rect(v * dt * float(np.sinc(half / pi)), theta + half)
-        x, y = x + move.real, y + move.imag
+        x = x + move.real
+        y = y + move.imag
         return np.array([x, y, (theta + 2 * half + pi) % (2 * pi) - pi, v, omega])
 
 
@@ -136,7 +138,9 @@ class _Wheels:
         points : where the point is now, and is to be, one after the other, shape (k+1, 2) [m].
         times : when it is to be there, shape (k+1,) [s].
         """
-        at, states, controls = own, [self.robot.body(own)], list[Array]()
+        at = own
+        states = [self.robot.body(own)]
+        controls = list[Array]()
         lasts = np.diff(times).tolist()
         for (px, py), dt in zip(points[1:].tolist(), lasts, strict=True):
             x, y, theta, *_ = at.tolist()
@@ -186,10 +190,12 @@ class DriveStep(Step):
 
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, whose wheels follow the point: arcs, of complex numbers."""
-        points, times = way.points[::PIECES], way.times[::PIECES]
+        points = way.points[::PIECES]
+        times = way.times[::PIECES]
         _, commands = self.wheels.follow(self.own, points, times)
         commands[0] = self.control
-        dt, (v, omega) = np.diff(way.times), np.repeat(commands, PIECES, axis=0).T
+        dt = np.diff(way.times)
+        v, omega = np.repeat(commands, PIECES, axis=0).T
         turned = np.append(self.own[2], omega * dt).cumsum()
         chords = v * dt * np.sinc(omega * dt / 2 / pi)
         moves = chords * np.exp(1j * (turned[:-1] + turned[1:]) / 2)
@@ -259,7 +265,8 @@ class DifferentialDrive(MPCCBF):
 
     def _plan_with(self, s: MPCSettings) -> MPCSettings:
         """Settings of the point ahead of the axle."""
-        turned, ahead = self.omega_max * s.dt, self.ahead
+        turned = self.omega_max * s.dt
+        ahead = self.ahead
         expected = f"in (0, pi/dt) = (0, {pi / s.dt:g})"
         require(0 < turned < pi, "omega_max", self.omega_max, expected, SolverError)
         expected = "positive, because the axle itself cannot move sideways"
@@ -279,7 +286,8 @@ class DifferentialDrive(MPCCBF):
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
         super().reset()
-        self._command, self._turns = np.full(2, np.nan), False
+        self._command = np.full(2, np.nan)
+        self._turns = False
         self._seen: Scene | None = None
         self._planned_velocity = np.zeros(2)
 
@@ -297,7 +305,8 @@ class DifferentialDrive(MPCCBF):
         turn = self._find_turn((x, y, theta), goal)
         # of the axle: it turns where it stands, or drives to the goal
         gx, gy = (x, y) if turn else goal
-        here, there = rect(self.ahead, theta), rect(self.ahead, theta + turn)
+        here = rect(self.ahead, theta)
+        there = rect(self.ahead, theta + turn)
         velocity = self._planned_velocity.tolist()
         deviation = hypot(*((own[3:] - self._command) * (1.0, self.ahead)))
         # the robot was stopped or pushed, or begins
@@ -311,9 +320,11 @@ class DifferentialDrive(MPCCBF):
         """The command with which the wheels follow the point."""
         point = Step(**found)
         asked = self._seen = point.scene
-        planned, times = point.planned[:2], self._s.times[:2]
+        planned = point.planned[:2]
+        times = self._s.times[:2]
         _, (control,) = self._wheels.follow(self._own, planned[:, :2], times)
-        self._command, self._planned_velocity = control.copy(), planned[1, 2:]
+        self._command = control.copy()
+        self._planned_velocity = planned[1, 2:]
         state = self.robot.body(self._own)
         scene = self._make_scene(state, asked.goal, asked.tracked)
         found |= {"control": control, "scene": scene, "of_point": asked}
@@ -339,13 +350,16 @@ class DifferentialDrive(MPCCBF):
         wall or a person who stands. It turns its back to the goal, or as far as the point could be there
         then, and goes backwards.
         """
-        (x, y, theta), (gx, gy), scene = own, goal, self._seen
+        x, y, theta = own
+        gx, gy = goal
+        scene = self._seen
         reach = (1.5 if self._turns else 1.0) * _NEAR * self.ahead
         if scene is None or hypot(gx - x, gy - y) > reach:
             self._turns = False
             return 0.0
         headings = np.array([theta, *(atan2(y - gy, x - gx) + _TURNS)])
-        px, py = gx + self.ahead * np.cos(headings), gy + self.ahead * np.sin(headings)
+        px = gx + self.ahead * np.cos(headings)
+        py = gy + self.ahead * np.sin(headings)
         h = scene.find_standing_h(px, py)
         free = h.min(axis=0, initial=inf) >= _FREE
         turn = remainder(float(headings[1:][free[1:].argmax()]) - theta, 2 * pi)

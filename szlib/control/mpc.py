@@ -166,7 +166,8 @@ class MPCCBF(Controller):
         self.settings = settings or MPCSettings()
         self._s = self._plan_with(self.settings)
         self.zone = _choose_zone(zone, self._s.zone_speed)
-        self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
+        self.tracker = tracker or Tracker()
+        self._thread = dict[str, int]()
         self.obstacles = tuple(obstacles)
         for each in self.obstacles:
             if not isinstance(each, Obstacle):
@@ -191,7 +192,8 @@ class MPCCBF(Controller):
 
     def _take_near(self, is_near: Mask, at: Point) -> None:
         """Take these as what is fixed near the robot, and those among them that it can always stop before."""
-        self._near, self._near_from = self._fixed.chosen(is_near), at
+        self._near = self._fixed.chosen(is_near)
+        self._near_from = at
         self._walls_near = self._fixed_of_disc.chosen(is_near).walls
 
     def set_walls(self, walls: Any) -> None:
@@ -259,7 +261,8 @@ class MPCCBF(Controller):
         ------
         SolverError : a number or a shape cannot be used, or the controller belongs to another thread.
         """
-        began, clock = perf_counter(), self._clock
+        began = perf_counter()
+        clock = self._clock
         self._check_thread()
         clock.tick(now, stamps, self.tracker.memory)
         age = check_number("state_age", state_age)
@@ -307,7 +310,8 @@ class MPCCBF(Controller):
         brakes, is_safe = self._guard(scene, plan)
         if brakes:
             inputs = plan_braking(self._s, scene.state[2:])
-            status, plan = "braking", plan._replace(inputs=inputs)
+            status = "braking"
+            plan = plan._replace(inputs=inputs)
         if self._clock.has_begun:
             self._change = plan.inputs - self._plan
         self._plan = plan.inputs
@@ -325,7 +329,8 @@ class MPCCBF(Controller):
         A plan that violates a floor may be a poor local optimum, which leads through a wall; so it is
         compared with the one that is found from full braking.
         """
-        s, state = self._s, scene.state
+        s = self._s
+        state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
         question = Question(state, heading.target, last, scene.zones, self._near)
         guess = self._plan + self._change
@@ -335,7 +340,8 @@ class MPCCBF(Controller):
                 return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
-            points, times = heading.ways[0].at(np.array(s.times)), np.diff(s.times)
+            points = heading.ways[0].at(np.array(s.times))
+            times = np.diff(s.times)
             along = follow_velocities(
                 s, state[2:], np.diff(points, axis=0) / times[:, None]
             )
@@ -356,7 +362,9 @@ class MPCCBF(Controller):
 
         That is whether it touches nothing fixed, and whether it overlaps no body besides.
         """
-        s, state, control = self._s, scene.state, plan.inputs[0]
+        s = self._s
+        state = scene.state
+        control = plan.inputs[0]
         is_wall_far, is_body_far = self._find_far(scene, control)
         if is_wall_far and is_body_far:
             return False, (True, True)
@@ -364,7 +372,8 @@ class MPCCBF(Controller):
         path = self._carry(find_stopping_path(state, control, s))
         wall = Bound() if is_wall_far else self._walls_near.bound(path)
         body = Bound() if is_body_far else self._bound_bodies(bodies, path)
-        walls_safe, is_safe = wall.is_safe, body.is_safe
+        walls_safe = wall.is_safe
+        is_safe = body.is_safe
         if not is_safe:
             followed = self._carry(self._follow_plan(scene, plan.inputs))
             is_safe = self._bound_bodies(bodies, followed).is_safe
@@ -376,7 +385,8 @@ class MPCCBF(Controller):
         before, after = (body, rest[1]) if walls_safe else (wall, rest[0])
         if after.seen < min(-TOLERANCE, before.seen):
             return False, (walls_safe, False)
-        walls_safe, is_safe = rest[0].is_safe, rest[1].is_safe
+        walls_safe = rest[0].is_safe
+        is_safe = rest[1].is_safe
         return True, (walls_safe, walls_safe and is_safe)
 
     def _find_far(self, scene: Scene, control: Array) -> tuple[bool, bool]:
@@ -385,11 +395,14 @@ class MPCCBF(Controller):
         Within a step of `control` and the braking after it, it goes no farther than `reach`.
         """
         s, (x, y, vx, vy), (ax, ay) = self._s, scene.state, control.tolist()
-        last_vx, last_vy = vx + s.dt * ax, vy + s.dt * ay
-        stop, last = max(abs(last_vx), abs(last_vy)) / s.a_max, hypot(last_vx, last_vy)
+        last_vx = vx + s.dt * ax
+        last_vy = vy + s.dt * ay
+        stop = max(abs(last_vx), abs(last_vy)) / s.a_max
+        last = hypot(last_vx, last_vy)
         reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
         reach += s.r_robot - self.settings.r_robot
-        contact, time = BODY_RADIUS + self.settings.r_robot + reach, stop + 2 * s.dt
+        contact = BODY_RADIUS + self.settings.r_robot + reach
+        time = stop + 2 * s.dt
         is_body_far = all(
             dist(person.position, (x, y)) >= contact + time * hypot(*person.velocity)
             for person in scene.people
@@ -399,7 +412,8 @@ class MPCCBF(Controller):
 
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
-        s, horizon = self._s, build_horizon(self._s)
+        s = self._s
+        horizon = build_horizon(self._s)
         states = horizon.states(np.array(scene.state), inputs)
         bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
         followed = Path(states[:, :2], horizon.times, bows)
@@ -427,11 +441,13 @@ class MPCCBF(Controller):
 
     def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
         """Take what can matter among everything fixed. Looked for once a metre: see `Obstacles.find_near`."""
-        s, speed = self._s, hypot(vx, vy)
+        s = self._s
+        speed = hypot(vx, vy)
         is_near = dist((x, y), self._near_from) <= 1.0 and speed <= s.v_max
         if self._fixed.size <= _FEW or is_near:
             return
-        longest, speed = max(s.step_lengths), max(s.v_max, speed)
+        longest = max(s.step_lengths)
+        speed = max(s.v_max, speed)
         time = s.times[-1] + 2 * longest * s.dt / (1 - (1 - s.gamma) ** longest)
         time = max(time, 2 * s.dt + speed / s.a_max)  # until it rests
         reach = s.r_robot + s.eps + speed * time + 1.0
@@ -448,7 +464,8 @@ class MPCCBF(Controller):
         """What the step is asked, with the zone of every person; for the disc, or for the planned point."""
         s = self._s if is_point else self.settings
         fixed = self._fixed if is_point else self._fixed_of_disc
-        people, groups = tracked.people, list[Group]()
+        people = tracked.people
+        groups = list[Group]()
         found = tuple([self.zone_of(each) for each in people])
         if people:
             placed = list[float]()
@@ -466,8 +483,11 @@ class MPCCBF(Controller):
 
     def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
         """Where the plan heads; among unknown people, where full braking ends."""
-        s, (x, y, vx, vy), goal = self._s, scene.state, scene.goal
-        at, heading = (x, y), None
+        s = self._s
+        x, y, vx, vy = scene.state
+        goal = scene.goal
+        at = (x, y)
+        heading = None
         if route is not None:
             corners = check_array("route", route, (len(np.atleast_1d(route)), 2))
             heading = self._ways.follow(at, goal, corners)
@@ -479,7 +499,8 @@ class MPCCBF(Controller):
             time = max(abs(vx), abs(vy)) / s.a_max
             target = x + vx * time / 2, y + vy * time / 2
         elif scene.people and not (heading and heading.ways):
-            zones, fixed = scene.zones.groups[0].numbers.tolist(), self._near
+            zones = scene.zones.groups[0].numbers.tolist()
+            fixed = self._near
             target = find_target(at, target, zones, fixed, s)
         if heading:
             return heading._replace(target=target)
@@ -523,7 +544,8 @@ class MPCCBF(Controller):
         goal : (x, y) [m], which must be free of everything fixed and of people who stand.
         people : everybody who is present.
         """
-        scene, limit = self._ask(state, goal, people), self._s.v_max
+        scene = self._ask(state, goal, people)
+        limit = self._s.v_max
         *at, vx, vy = scene.state
         for fault, place, h in (
             ("the run starts in violation", at, scene.barriers.h(*at)),

@@ -41,8 +41,10 @@ def _project(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> tuple[Any, .
     The place is measured from the middle (paper, eq. 3).
     """
     length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
-    ux, uy = (xb - xa) / length, (yb - ya) / length
-    dx, dy = x - (xa + xb) / 2, y - (ya + yb) / 2
+    ux = (xb - xa) / length
+    uy = (yb - ya) / length
+    dx = x - (xa + xb) / 2
+    dy = y - (ya + yb) / 2
     return length, dx * uy - dy * ux, dx * ux + dy * uy
 
 
@@ -291,7 +293,8 @@ class Obstacle:
 
 def _drift(t: Any, knots: Any) -> list[Any]:
     """Integrals of rates from 0 to `t`; `knots`: for each interval its end, and its rates."""
-    found, begin = [0.0] * (KNOT - 1), 0.0
+    found = [0.0] * (KNOT - 1)
+    begin = 0.0
     for i in range(0, len(knots), KNOT):
         end, *rates = knots[i : i + KNOT]
         # time within the interval
@@ -330,7 +333,8 @@ class Zone(Obstacle):
         """
         (x, y), c, s = position, cos(heading), sin(heading)
         ma, na, mb, nb, a = zone.foci_and_axis
-        xa, ya = x + ma * c - na * s, y + ma * s + na * c
+        xa = x + ma * c - na * s
+        ya = y + ma * s + na * c
         return xa, ya, x + mb * c - nb * s, y + mb * s + nb * c, a, x, y, *velocity
 
     @staticmethod
@@ -551,7 +555,8 @@ class Obstacles(NamedTuple):
 
     def chosen(self, is_near: Mask) -> Obstacles:
         """Those that are near, by whether each of them is, shape (n,)."""
-        groups, rest = list[Group](), is_near
+        groups = list[Group]()
+        rest = is_near
         for kind, numbers, offsets in self.groups:
             own, rest = np.split(rest, [len(offsets)])
             if own.any():
@@ -644,7 +649,8 @@ class Obstacles(NamedTuple):
     ) -> Array:
         """The `formula` of each obstacle, shape (n, ...); of a barrier less its offset."""
         shape = np.shape(x + y + t)
-        found, axes = np.empty((self.size, *shape)), (...,) + (None,) * len(shape)
+        found = np.empty((self.size, *shape))
+        axes = (...,) + (None,) * len(shape)
         begin = 0
         for kind, numbers, offsets in self.groups:
             values = getattr(kind, formula)(x, y, t, *numbers.T[axes])
@@ -688,7 +694,8 @@ def rebuild(kind: type[Obstacle], numbers: Sequence[float]) -> Obstacle:
 
 def number_kinds(obstacles: Iterable[Obstacle]) -> list[str]:
     """A name for each of the `obstacles`: its kind, and its number among those of this kind."""
-    counts, names = Counter[str](), list[str]()
+    counts = Counter[str]()
+    names = list[str]()
     for each in obstacles:
         names.append(f"{each.kind}_{counts[each.kind]}")
         counts[each.kind] += 1

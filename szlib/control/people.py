@@ -145,7 +145,8 @@ class Prediction:
 
 def list_knots(person: Person, settings: MPCSettings) -> Array:
     """What `Zone` and `Body` of a `person` need for each interval of the horizon of these `settings`."""
-    times, offsets = np.array(settings.times), np.zeros((settings.N + 1, 3))
+    times = np.array(settings.times)
+    offsets = np.zeros((settings.N + 1, 3))
     if person.prediction is not None:
         offsets = person.prediction.sample(person, times)
     rates = np.diff(offsets, axis=0) / np.diff(times)[:, None]
@@ -180,7 +181,8 @@ def predict(
     (1.0, 0.2)
     """
     rows = check_array("people", people, (..., 4)).reshape(-1, 4).tolist()
-    n, spreads = len(rows), check_array("spread", spread, (...,))
+    n = len(rows)
+    spreads = check_array("spread", spread, (...,))
     positions = check_array("positions", positions, (n, np.size(times), 2))
     spreads = spreads if spreads.ndim else np.full(n, spreads)
     expected = f"a number, or one for each of {n} people"
@@ -246,7 +248,8 @@ class Person:
         vars(self).update(position=position, velocity=velocity, heading=heading)
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
-        is_one, name = isinstance(self.prediction, Prediction | None), "prediction"
+        is_one = isinstance(self.prediction, Prediction | None)
+        name = "prediction"
         require(is_one, name, self.prediction, "a Prediction", SolverError)
 
     @property
@@ -258,11 +261,16 @@ class Person:
         """The same person, `seconds` later, as predicted, but no farther from the origin than `LARGEST`."""
         if not seconds or (self.stands and self.prediction is None):
             return self
-        (x, y), (vx, vy), later = self.position, self.velocity, self.prediction
-        x, y = x + vx * seconds, y + vy * seconds
+        x, y = self.position
+        vx, vy = self.velocity
+        later = self.prediction
+        x = x + vx * seconds
+        y = y + vy * seconds
         if later is not None:
             dx, dy, _ = later.sample(self, np.array([seconds]))[0].tolist()
-            x, y, later = x + dx, y + dy, later.later(seconds)
+            x = x + dx
+            y = y + dy
+            later = later.later(seconds)
         person = self.at([max(-LARGEST, min(each, LARGEST)) for each in (x, y)])
         vars(person).update(prediction=later)
         return person
@@ -328,7 +336,8 @@ class Tracker:
         self.walking_speed = check_finite("walking_speed", walking_speed, 0.0)
         self.memory = check_finite("memory", memory, 0.0)
         self._last_seen: dict[Hashable, _LastSeen] = {}
-        self._now, self._interval = inf, 0.0
+        self._now = inf
+        self._interval = 0.0
 
     def reset(self) -> None:
         """Forget everybody."""
@@ -375,7 +384,9 @@ class Tracker:
                 "hashable values, one for each; stamps must be one time [s], or one for each; got "
                 f"{people!r:.200}, {ids!r:.200}, {stamps!r:.200}: {error}"
             ) from error
-        present, rejected, unknown = list[Person](), 0, 0
+        present = list[Person]()
+        rejected = 0
+        unknown = 0
         for person, is_usable, name, time in measured:
             if given[name] > 1 or name != name:  # NaN
                 name = None
@@ -422,7 +433,8 @@ class Tracker:
         if not hypot(x, y) <= LARGEST:
             return None, False
         speed = hypot(vx, vy)
-        is_usable, is_slow = speed <= LARGEST, not speed >= self.walking_speed
+        is_usable = speed <= LARGEST
+        is_slow = not speed >= self.walking_speed
         velocity = (vx, vy) if is_usable else (0.0, 0.0)
         return Person((x, y), velocity, id=name, heading_unknown=is_slow), is_usable
 
@@ -443,7 +455,8 @@ class Tracker:
         self, person: Person, name: Hashable, last: _LastSeen | None
     ) -> Person:
         """A measured `person` with their id, and with the heading that is known of them."""
-        heading, (vx, vy) = person.heading, person.velocity
+        heading = person.heading
+        vx, vy = person.velocity
         is_slow = hypot(vx, vy) < self.walking_speed and not person.stands
         if heading is None or (is_slow and heading == atan2(vy, vx)):
             heading = last[0].heading if last else None

@@ -60,7 +60,8 @@ _EVERY = slice(None)
 _MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 # DAQP's answers; the second one if it violates rows with a price
-_SOLVED, _VIOLATED = 1, 2
+_SOLVED = 1
+_VIOLATED = 2
 # No regularisation of convex programs; beside the exact penalty, a negligible quadratic one.
 _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3, "eq_reduction": -1}
 
@@ -101,7 +102,8 @@ class TimeBudget:
     """
 
     def __init__(self, limit: float, deadline: float = inf) -> None:
-        self._limit, self._deadline = limit, deadline
+        self._limit = limit
+        self._deadline = deadline
         self.begin(perf_counter())
 
     def begin(self, began: float) -> None:
@@ -142,7 +144,9 @@ class Program(LinearProblem):
         self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
     ) -> None:
         super().__init__(settings, shapes, has_floors)
-        s, k, times = settings, self.steps, np.array(settings.times)
+        s = settings
+        k = self.steps
+        times = np.array(settings.times)
         # inputs change by 2 a_max at most on each axis
         change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
         self.near = np.full_like(self.lower, -inf)
@@ -184,7 +188,8 @@ class Program(LinearProblem):
         hard rows contradict each other. To change a model of DAQP takes half the time of a new one, and its
         answers are the same; the number of rows with a price must not change, because it sizes the memory.
         """
-        weights, slopes = prices[rows], self.slopes[rows][len(self.gradient) :]
+        weights = prices[rows]
+        slopes = self.slopes[rows][len(self.gradient) :]
         given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
         size = None if rows is _EVERY else (len(weights), np.count_nonzero(weights))
         model = self._models.pop(size, None)
@@ -208,8 +213,10 @@ class Program(LinearProblem):
 
     def _solve_levels(self, near: NDArray[np.intp]) -> tuple[Array, Array, bool] | None:
         """Level by level: the least violation, which is fixed for the next levels."""
-        found, lower = None, self.lower.copy()
-        prices, sense = self.prices.copy(), self._sense.copy()
+        found = None
+        lower = self.lower.copy()
+        prices = self.prices.copy()
+        sense = self._sense.copy()
         chosen, near = np.split(near, [self.first])
         levels = self.levels[near - self.first]
         for level in np.unique(levels):
@@ -302,7 +309,8 @@ class Planner:
         return program
 
     def _plan(self, question: Question, guess: Array, has_floors: bool) -> Plan:
-        program, s = self.prepare(question, has_floors), self.settings
+        program = self.prepare(question, has_floors)
+        s = self.settings
         is_relaxed = is_converged = timed_out = False
         program.inputs[:], program.multipliers[:] = guess, self._on_speed
         before: Array | None = None

@@ -62,14 +62,19 @@ class Motion(NamedTuple):
 @lru_cache(maxsize=64)
 def build_motion(settings: MPCSettings) -> Motion:
     """The motion of a double integrator, and the cost, for these `settings`."""
-    s, inputs, given = settings, ca.SX.sym("u", 2, settings.N), ca.SX.sym("given", 8)
+    s = settings
+    inputs = ca.SX.sym("u", 2, settings.N)
+    given = ca.SX.sym("given", 8)
     states = [given[:4]]
     for k, length in enumerate(s.step_lengths):
-        position, velocity = states[-1][:2], states[-1][2:]
-        a, dt = inputs[:, k], length * s.dt
+        position = states[-1][:2]
+        velocity = states[-1][2:]
+        a = inputs[:, k]
+        dt = length * s.dt
         moved = position + dt * velocity + 0.5 * dt**2 * a
         states.append(ca.vertcat(moved, velocity + dt * a))
-    x, lengths = ca.horzcat(*states), np.array(s.step_lengths, float)
+    x = ca.horzcat(*states)
+    lengths = np.array(s.step_lengths, float)
     weights = ca.DM(np.column_stack([np.zeros(4), np.outer(s.Q, lengths[:-1]), s.P]))
     error = x - ca.repmat(ca.vertcat(given[4:6], 0, 0), 1, s.N + 1)
     cost = ca.dot(weights, error**2) + ca.dot(ca.DM(np.outer(s.R, lengths)), inputs**2)
@@ -96,7 +101,8 @@ class Horizon(NamedTuple):
     def states(self, state: Array, inputs: Array) -> Array:
         """States x_0 .. x_N, shape (N+1, 4), from a `state` by `inputs`, shape (N, 2)."""
         states = np.empty((len(self.times), 4))
-        states[0], ahead = state, self.times[1:, None] * state[2:]
+        states[0] = state
+        ahead = self.times[1:, None] * state[2:]
         states[1:, :2] = state[:2] + ahead + self.to_positions @ inputs
         states[1:, 2:] = state[2:] + self.to_velocities @ inputs
         return states
@@ -105,8 +111,10 @@ class Horizon(NamedTuple):
 @lru_cache(maxsize=64)
 def build_horizon(settings: MPCSettings) -> Horizon:
     """The matrices of the motion for these `settings`."""
-    times, past = np.array(settings.times), np.tri(settings.N)
-    dt, ends = np.diff(times), times[1:]
+    times = np.array(settings.times)
+    past = np.tri(settings.N)
+    dt = np.diff(times)
+    ends = times[1:]
     return Horizon(times, past * dt * (ends[:, None] - ends + dt / 2), past * dt)
 
 
@@ -124,12 +132,16 @@ def follow_velocities(
     velocity : of the robot now [m/s].
     wanted : at the end of each step, shape (N, 2) [m/s].
     """
-    v, slowest, plan = velocity, hypot(*velocity), list[Point]()
+    v = velocity
+    slowest = hypot(*velocity)
+    plan = list[Point]()
     ends = zip(wanted.tolist(), s.step_lengths, s.times[1:], strict=True)
     for (wx, wy), length, time in ends:
-        dt, limit = s.dt * length, max(s.v_max, slowest - s.a_max * time)
+        dt = s.dt * length
+        limit = max(s.v_max, slowest - s.a_max * time)
         share = min(1.0, limit / (hypot(wx, wy) or 1.0))
-        dx, dy = share * wx - v[0], share * wy - v[1]
+        dx = share * wx - v[0]
+        dy = share * wy - v[1]
         seconds = max(dt, abs(dx) / s.a_max, abs(dy) / s.a_max)
         plan.append((dx / seconds, dy / seconds))
         v = v[0] + dt * dx / seconds, v[1] + dt * dy / seconds
@@ -162,7 +174,9 @@ def list_conditions(
 
     With the floors of `szlib.control.planner` if it `has_floors`.
     """
-    s, lengths, found = settings, settings.step_lengths, list[Condition]()
+    s = settings
+    lengths = settings.step_lengths
+    found = list[Condition]()
     stop = min(1.0, s.a_max * s.dt / s.v_max)
     if not kind.has_barrier:
         return (Condition(kind.priority, (0.0,) * s.N),)
@@ -208,7 +222,8 @@ def _linearise_kind(
     settings: MPCSettings, kind: Any, has_floors: bool, n: int, count: int
 ) -> Any:
     """(positions, numbers and offsets) -> (bounds, slopes) of all conditions on `n` obstacles of a kind."""
-    at, numbers = ca.SX.sym("at", 2, settings.N + 1), ca.SX.sym("numbers", count + 1)
+    at = ca.SX.sym("at", 2, settings.N + 1)
+    numbers = ca.SX.sym("numbers", count + 1)
     values = _write_conditions(settings, kind, has_floors, numbers, at)
     # the first state is given
     moves = ca.DM(np.kron(build_horizon(settings).to_positions, np.eye(2)))
@@ -226,9 +241,13 @@ _MOST_CURVED = 1e3
 @lru_cache(maxsize=64)
 def _linearise_motion(settings: MPCSettings) -> Any:
     """The part of a quadratic program without obstacles: see `LinearProblem`."""
-    s, (inputs, given, states, cost) = settings, build_motion(settings)
-    horizon, u, n = build_horizon(s), ca.vec(inputs), s.N
-    distance, multipliers = ca.norm_2(given[4:6] - given[:2]), ca.SX.sym("speed", n)
+    s = settings
+    inputs, given, states, cost = build_motion(settings)
+    horizon = build_horizon(s)
+    u = ca.vec(inputs)
+    n = s.N
+    distance = ca.norm_2(given[4:6] - given[:2])
+    multipliers = ca.SX.sym("speed", n)
     curved_by = ca.fmin(ca.fmax(-multipliers, 0), _MOST_CURVED)
     scale = 2 / (distance + 1 + ca.fabs(distance - 1))
     velocity = states[2:, 1:]
@@ -280,7 +299,9 @@ class LinearProblem:
     def __init__(
         self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
     ) -> None:
-        s, n, motion = settings, 2 * settings.N, _linearise_motion(settings)
+        s = settings
+        n = 2 * settings.N
+        motion = _linearise_motion(settings)
         kinds = [kind for kind, number, _ in shapes for _ in range(number)]
         rows = [
             (condition.level, k)
@@ -291,16 +312,22 @@ class LinearProblem:
         self.levels, self.steps = np.reshape(rows, (-1, 2)).astype(int).T
         self.first = motion.numel_out(1)
         size = self.first + len(rows)
-        self.inputs, self.given = np.zeros((s.N, 2)), np.zeros(8)
+        self.inputs = np.zeros((s.N, 2))
+        self.given = np.zeros(8)
         self.multipliers = np.zeros(s.N)
-        self.lower, self.upper = np.zeros(size), np.full(size, 1e30)
-        self.slopes, self.hessian = np.zeros((size, n)), np.zeros((n, n))
-        self.gradient, self.cost = np.zeros(n), np.zeros(1)
+        self.lower = np.zeros(size)
+        self.upper = np.full(size, 1e30)
+        self.slopes = np.zeros((size, n))
+        self.hessian = np.zeros((n, n))
+        self.gradient = np.zeros(n)
+        self.cost = np.zeros(1)
         arguments = [self.inputs, self.given, self.multipliers]
-        positions, begin = np.zeros((s.N + 1, 2)), self.first
+        positions = np.zeros((s.N + 1, 2))
+        begin = self.first
         results = [positions, self.lower, self.upper, self.slopes[n:], self.hessian]
         results += [self.gradient, self.cost]
-        self._calls, self._numbers = [_call(motion, arguments, results)], list[Array]()
+        self._calls = [_call(motion, arguments, results)]
+        self._numbers = list[Array]()
         for kind, number, count in shapes:
             numbers = np.zeros((number, count + 1))
             function = _linearise_kind(s, kind, has_floors, number, count)
@@ -365,7 +392,8 @@ def solve_by_ipopt(
     question : what is asked.
     guess : inputs to begin with, shape (N, 2) [m/s2].
     """
-    s, groups = settings, question.barriers.groups
+    s = settings
+    groups = question.barriers.groups
     shapes = tuple((kind, *numbers.shape) for kind, numbers, _ in groups)
     numbers = [np.column_stack(group[1:]).ravel() for group in groups]
     given = [*question.state, *question.target, *question.last]
@@ -390,8 +418,10 @@ def solve_by_ipopt(
 @lru_cache(maxsize=256)
 def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
     """The problem in symbols, and its solver."""
-    s, (inputs, given, x, cost) = settings, build_motion(settings)
-    numbers, rows = list[Any](), list[Any]()
+    s = settings
+    inputs, given, x, cost = build_motion(settings)
+    numbers = list[Any]()
+    rows = list[Any]()
     for kind, n, count in shapes:
         own = ca.SX.sym(kind.kind, count + 1, n)
         numbers.append(ca.vec(own))

@@ -143,7 +143,8 @@ class MPCSettings:
         put = partial(object.__setattr__, self)
         for holds, expected, names in _RANGES:
             for name in names.split():
-                value, shape = getattr(self, name), np.shape(getattr(MPCSettings, name))
+                value = getattr(self, name)
+                shape = np.shape(getattr(MPCSettings, name))
                 if name in _LIMITS.split() and value == inf:
                     continue
                 numbers = check_array(name, value, shape)
@@ -154,7 +155,8 @@ class MPCSettings:
             is_count = isinstance(value, int | np.integer) and value >= 1
             require(is_count, name, value, "a whole number >= 1", SolverError)
         for name, choice in _CHOICES.items():
-            value, allowed = getattr(self, name), get_args(choice)
+            value = getattr(self, name)
+            allowed = get_args(choice)
             expected = " or ".join(map(repr, allowed))
             require(value in allowed, name, value, expected, SolverError)
         put("grid", grid := tuple(map(operator.index, self.grid)))

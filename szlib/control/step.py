@@ -234,7 +234,8 @@ class Step:
     @cached_property
     def _rows(self) -> list[Rows]:
         """The rows of every level at the states of the plan."""
-        scene, x = self.asked, self.planned
+        scene = self.asked
+        x = self.planned
         s = scene.settings
         at = (*x.T[:2], np.array(s.times))
         bodies = find_bodies(scene.zones, s, as_predicted=True)
@@ -324,8 +325,10 @@ class Step:
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified: what happened, and what would help."""
-        scene, control = self.scene, self._units.format(*self.control)
-        report, danger = self.verify(), self._find_danger()
+        scene = self.scene
+        control = self._units.format(*self.control)
+        report = self.verify()
+        danger = self._find_danger()
         verdict = f"not safe: {danger}" if danger else "safe"
         lines = [
             f"Step: {_MEANING[self.status]}; {verdict}",
@@ -347,7 +350,9 @@ class Step:
 
     def _list_notes(self) -> list[str]:
         """What else has to be known, and what would help."""
-        scene, s, worst = self.scene, self.scene.settings, self.violations
+        scene = self.scene
+        s = self.scene.settings
+        worst = self.violations
         falls = self.residual.min(axis=1)
         slowest = scene.name(int(falls.argmin())) if len(falls) else ""
         is_cut = s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE
@@ -384,7 +389,8 @@ class Step:
         """How far the goal is, and what holds the robot: the barriers that are at their limit."""
         holding = np.flatnonzero(self.residual.min(axis=1, initial=inf) <= HOLDS)
         names = " and ".join(self.scene.name(i) for i in holding.tolist())
-        s, away = self.scene.settings, dist(self.scene.state[:2], self.scene.goal)
+        s = self.scene.settings
+        away = dist(self.scene.state[:2], self.scene.goal)
         helps = "another goal or a route" if s.decay_price < inf else "among_people()"
         return f"{away:.1f} m from the goal; held by {names or 'nothing'}; what helps: {helps}"
 

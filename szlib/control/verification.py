@@ -71,7 +71,9 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
 
     `h` are the barriers there, and `gaps` those to bodies less `body_gap`, shape (n, N+1) each [m].
     """
-    s, lengths, first = scene.settings, np.array(scene.settings.step_lengths), 0
+    s = scene.settings
+    lengths = np.array(scene.settings.step_lengths)
+    first = 0
     stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
     for kind, _, offsets in scene.barriers.groups:
         own = h[first : first + len(offsets)]
@@ -130,7 +132,9 @@ class Sampled(NamedTuple):
 
 def verify_step(step: Any) -> Report:
     """Check the plan of a `step` (a `Step`), and its claims."""
-    scene, s, x = step.scene, step.asked.settings, np.asarray(step.planned, float)
+    scene = step.scene
+    s = step.asked.settings
+    x = np.asarray(step.planned, float)
     lengths = np.array(s.step_lengths)
     way = _sample(np.array(step.asked.state), step.inputs, s.dt * lengths)
     h = _measure(step.asked, x[:, :2], way.times[::PIECES], is_barrier=True)
@@ -147,7 +151,8 @@ def verify_step(step: Any) -> Report:
     if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
         gap = -np.inf
     least = of_disc[:, [0, -1]].min(initial=np.inf)
-    lowest, slack = float(min(least, gap, of_zones)), max(0.0, -worst.value)
+    lowest = float(min(least, gap, of_zones))
+    slack = max(0.0, -worst.value)
     feasible = slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
     compared = [
@@ -189,13 +194,16 @@ def _sample(state: Array, inputs: Array, lasts: Array, rests_by: Any = None) -> 
     Then it brakes as hard as it can, with the settings `rests_by`.
     """
     if rests_by:
-        v, dt = state[2:] + lasts @ inputs, rests_by.dt
+        v = state[2:] + lasts @ inputs
+        dt = rests_by.dt
         stop = np.abs(v).max() / rests_by.a_max
         n = min(int(np.ceil(stop / dt - ROUNDING)), _SAMPLES)
         stop = max(dt, stop)
         inputs = np.concatenate([inputs, np.tile(-v / stop, (n, 1))])
         lasts = np.append(lasts, np.full(n, stop / max(1, n)))
-    points, times, states = [state[None, :2]], [np.zeros(1)], [state]
+    points = [state[None, :2]]
+    times = [np.zeros(1)]
+    states = [state]
     shares = np.linspace(0.0, 1.0, _SAMPLES)[1:]
     for u, dt in zip(inputs, lasts, strict=True):
         p, v = np.split(states[-1], 2)
@@ -211,7 +219,9 @@ def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
 
     Its inputs have the times `lasts`.
     """
-    scene, s, is_clear = step.scene, step.asked.settings, list[bool]()
+    scene = step.scene
+    s = step.asked.settings
+    is_clear = list[bool]()
     levels = np.array([each.priority for each in scene.barriers.items], int)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
     for n in (1, s.N):
@@ -254,7 +264,8 @@ def _measure(
 
     People keep their velocity, or move `as_predicted`.
     """
-    s, found = scene.settings, list[Array]()
+    s = scene.settings
+    found = list[Array]()
     for i, each in enumerate(scene.barriers.items):
         if isinstance(each, Zone):
             person = scene.people[i]
@@ -262,7 +273,8 @@ def _measure(
             offset = points - center
             measured = np.hypot(*offset.T) - BODY_RADIUS
             if is_barrier:
-                zone, heading = scene.person_zones[i], person.heading or 0.0
+                zone = scene.person_zones[i]
+                heading = person.heading or 0.0
                 measured = _measure_zone(offset, heading, zone) - growth
         elif isinstance(each, Wall):
             measured = _measure_wall(points, each, is_barrier)
@@ -300,7 +312,8 @@ def _measure_zone(offset: Array, heading: float, zone: Ellipse) -> Array:
 def _measure_wall(points: Array, wall: Wall, is_barrier: bool) -> Array:
     """Approximate distance to a wall (paper, eq. 3-5), or the Euclidean one."""
     xa, ya, xb, yb = wall.numbers
-    start, along = complex(xa, ya), complex(xb - xa, yb - ya)
+    start = complex(xa, ya)
+    along = complex(xb - xa, yb - ya)
     length = abs(along)
     # complex numbers: along the wall from its middle, and across
     seen = (points @ (1, 1j) - start) / (along / length) - length / 2

@@ -49,10 +49,8 @@ def read_walls(walls: Any) -> Array:
     lines = np.concatenate([[], *(lines for lines, _ in _find_shapes(walls))])
     check_array("a wall", shapely.get_coordinates(lines), (..., 2))
     lines = shapely.remove_repeated_points(lines, SHORTEST_WALL)
-    is_long, expected = (
-        shapely.length(lines) >= SHORTEST_WALL,
-        f"{SHORTEST_WALL} m long or longer",
-    )
+    is_long = shapely.length(lines) >= SHORTEST_WALL
+    expected = f"{SHORTEST_WALL} m long or longer"
     require(is_long.all(), "a wall", lines[~is_long], expected, SolverError)
     corners, line = shapely.get_coordinates(lines, return_index=True)
     ends = np.stack([corners[:-1], corners[1:]], axis=1)
@@ -135,7 +133,8 @@ def walls_from_map(
     ([4.0, 0.0], [10.0, 2.0])
     >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), walls=walls)
     """
-    what, folder = "the map", Path(path).parent
+    what = "the map"
+    folder = Path(path).parent
     try:
         entries = {
             "negate": 0,
@@ -192,11 +191,10 @@ def walls_from_grid(
     >>> walls_from_grid(np.ones((20, 40), bool), resolution=0.05).shape  # a block of 2 m by 1 m
     (4, 2, 2)
     """
-    side, within = (
-        check_number("resolution", resolution),
-        check_number("simplify", simplify),
-    )
-    given, expected = (side, within), "positive, and at least 0"
+    side = check_number("resolution", resolution)
+    within = check_number("simplify", simplify)
+    given = (side, within)
+    expected = "positive, and at least 0"
     require(side > 0 <= within, "resolution, simplify", given, expected, SolverError)
     x, y, yaw = check_vector("origin", origin, 3)
     cells = np.asarray(occupied, bool)
@@ -205,6 +203,7 @@ def walls_from_grid(
     edges = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (row, begin), end = (edges > 0).nonzero(), (edges < 0).nonzero()[1]
     outlines = shapely.union_all(shapely.box(begin, row, end, row + 1))
-    c, s = side * cos(yaw), side * sin(yaw)
+    c = side * cos(yaw)
+    s = side * sin(yaw)
     turn = [c, -s, s, c, x, y]
     return read_walls(affine_transform(shapely.simplify(outlines, within / side), turn))

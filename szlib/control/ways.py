@@ -44,15 +44,20 @@ CELL = 0.15
 """Side of a cell [m] (assumed)."""
 MOST_CELLS = 250_000
 """Number of cells of a map, without its margin; those of a larger one are larger (assumed)."""
-SEARCH_RADIUS, SEARCH_TIME = 4.0, 6.0
+SEARCH_RADIUS = 4.0
+SEARCH_TIME = 6.0
 """How far the search looks, from the robot [m], and in time [s] (assumed)."""
 SEARCH_INTERVAL = 0.4
 """Time between two searches, rounded up to whole steps [s] (assumed)."""
-ZONE_SECOND, BODY_SECOND, REPEAT_SECOND = 2.0, 100.0, 1.5
+ZONE_SECOND = 2.0
+BODY_SECOND = 100.0
+REPEAT_SECOND = 1.5
 """Price of a second in a zone, in a body, and near a way that was found before [s] (assumed)."""
 SIDE_PRICE = 0.5
 """Price of passing people, who do not cross the way, on the side that is not `pass_side` [s] (assumed)."""
-GROUP_SECOND, GROUP_DISTANCE, GROUP_SPEED = 4.0, 1.5, 0.3
+GROUP_SECOND = 4.0
+GROUP_DISTANCE = 1.5
+GROUP_SPEED = 0.3
 """Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed).
 People of a group that is given are together up to twice this distance."""
 SWITCH_GAIN = 1.0
@@ -60,11 +65,13 @@ SWITCH_GAIN = 1.0
 MOST_WAYS = 3
 """Number of ways that are looked for (assumed)."""
 # the edge of a map is so far from its points, at least and at most [m]
-_AROUND, _FARTHEST_WALL = 8.0, 35.0
+_AROUND = 8.0
+_FARTHEST_WALL = 35.0
 _FARTHEST = 10.0  # of a target on a route [m]
 _CHUNK = 1_000_000  # cells that are measured at once
 # places of people who stand are rounded so, and a goal is the same if it moved less [m]
-_MOVED, _GOAL_MOVED = 0.3, 0.5
+_MOVED = 0.3
+_GOAL_MOVED = 0.5
 _NEAR_WAY = 3  # cells that are near a way are at most so many steps from it
 _EVERY = 20  # turns are measured around so many cells that are not free, one of
 _MOST_SHARE = 1.2  # least offset of obstacles, in cells: no step leads across a wall
@@ -150,7 +157,8 @@ class Map:
         ends = ends[np.isfinite(ends).all(axis=1)]
         low = np.maximum(ends.min(axis=0), points.min(axis=0) - _FARTHEST_WALL)
         high = np.minimum(ends.max(axis=0), points.max(axis=0) + _FARTHEST_WALL)
-        self._middle, size = (low + high) / 2, high - low
+        self._middle = (low + high) / 2
+        size = high - low
         self._reach = size / 2
         side = min(CELL, clearance / _MOST_SHARE)
         self.cell = max(side, float(sqrt(size.prod() / MOST_CELLS)))
@@ -177,7 +185,8 @@ class Map:
             counts = sizes.prod(axis=1)
             indices = np.arange(len(counts))
             for rows in np.array_split(indices, 1 + counts.sum() // _CHUNK):
-                which, ends = np.repeat(rows, counts[rows]), counts[rows].cumsum()
+                which = np.repeat(rows, counts[rows])
+                ends = counts[rows].cumsum()
                 place = np.arange(len(which)) - np.repeat(
                     ends - counts[rows], counts[rows]
                 )
@@ -189,14 +198,16 @@ class Map:
 
     def _link(self) -> None:
         """Find the pairs of free neighbours, in 16 directions, and their distances."""
-        pairs, lengths = list[Array](), list[Array]()
+        pairs = list[Array]()
+        lengths = list[Array]()
         numbers = np.flatnonzero(self.free)
         for i, j in _NEIGHBOURS:
             to = numbers + i * self.shape[1] + j
             is_free = self.free.ravel()[to]
             pairs.append(np.stack([numbers, to])[:, is_free])
             lengths.append(np.full(is_free.sum(), self.cell * hypot(i, j)))
-        self._pairs, self._lengths = np.hstack(pairs), np.concatenate(lengths)
+        self._pairs = np.hstack(pairs)
+        self._lengths = np.concatenate(lengths)
 
     def centers(self, cells: ArrayLike) -> Array:
         """Centres of `cells`, shape (..., 2) [m]."""
@@ -214,7 +225,8 @@ class Map:
 
     def find_cell(self, point: ArrayLike, among: Mask | None = None) -> Cells:
         """The cell of a `point`, or the nearest one that is free, or is `among` these, shape (2,)."""
-        cell, mask = self.locate(np.array(point)), self.free if among is None else among
+        cell = self.locate(np.array(point))
+        mask = self.free if among is None else among
         places = np.argwhere(mask) if not mask[cell] else np.array([cell])
         return np.asarray(places[((places - cell) ** 2).sum(axis=1).argmin()])
 
@@ -223,12 +235,14 @@ class Map:
 
         Each cell has the `price` of a second; the robot drives at this `speed` [m/s].
         """
-        self.price, self.blocked = price, ~self.free | (price >= BODY_SECOND)
+        self.price = price
+        self.blocked = ~self.free | (price >= BODY_SECOND)
         self.is_near = self._parts == self._parts[*self.find_cell(start)]
         cell = self.find_cell(goal, self.is_near)
         self.is_reached = bool(self.is_near[*self.find_cell(goal)])
         self.end = self.centers(cell)
-        cost, (i, j) = 1 + price.ravel(), self._pairs
+        cost = 1 + price.ravel()
+        i, j = self._pairs
         weights = self._lengths / speed * (cost[i] + cost[j]) / 2
         graph = csr_array((weights, (i, j)), shape=2 * cost.shape)
         number = np.ravel_multi_index(cell, self.shape)
@@ -237,7 +251,8 @@ class Map:
 
     def descend(self, cell: Any) -> Array:
         """Centres of the cells from `cell` to the end, shape (n, 2) [m]."""
-        found, k = list[int](), int(np.ravel_multi_index(tuple(cell), self.shape))
+        found = list[int]()
+        k = int(np.ravel_multi_index(tuple(cell), self.shape))
         while k >= 0:
             found.append(k)
             k = int(self._next[k])
@@ -264,13 +279,16 @@ class WayFinder:
     """
 
     def __init__(self, fixed: Obstacles, settings: MPCSettings) -> None:
-        self._fixed, self._s = fixed, settings
+        self._fixed = fixed
+        self._s = settings
         self._map: Map | None = None
         self.reset()
 
     def reset(self) -> None:
         """Forget the goal and the way."""
-        self._ways, self._goal, self._steps = list[Way](), (inf, inf), 0
+        self._ways = list[Way]()
+        self._goal = (inf, inf)
+        self._steps = 0
         self._n_people = 0
         self._standing: Any = None
 
@@ -294,7 +312,9 @@ class WayFinder:
 
     def follow(self, at: Point, goal: Point, route: Array) -> Heading | None:
         """The target from `at` on a `route` to the `goal`, shape (m, 2) [m]; None if no point is in sight."""
-        m, self._steps, self._standing = self._get_map(at, goal), 0, None
+        m = self._get_map(at, goal)
+        self._steps = 0
+        self._standing = None
         m.blocked = ~m.free
         line = shapely.LineString(np.vstack([route, goal, goal]))
         line = shapely.segmentize(line, m.cell) if line.length else line
@@ -307,7 +327,8 @@ class WayFinder:
         points = np.array([at, goal])
         if self._map is None or not self._map.holds(points):
             self._map = Map(self._fixed, points, self._s.r_robot + self._s.eps)
-            self._standing, self._steps = None, 0
+            self._standing = None
+            self._steps = 0
         return self._map
 
     def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
@@ -334,8 +355,11 @@ class WayFinder:
         self, m: Map, at: Point, near: Surroundings
     ) -> Iterator[tuple[Way, Array]]:
         """Distinct ways on the map `m` from `at` this point, and their turns."""
-        v_max, low, window = self._s.v_max, near.low, near.window
-        far, begin = m.seconds_to_goal[window], near.start - low
+        v_max = self._s.v_max
+        low = near.low
+        window = near.window
+        far = m.seconds_to_goal[window]
+        begin = near.start - low
         dt = 1.2 * m.cell / v_max  # between a step along an axis and a diagonal one
         times: Array = dt * np.arange(1.0, ceil(SEARCH_TIME / dt) + 1)
         prices = near.find_prices(~near.stands, times, low, far.shape) + m.price[window]
@@ -343,11 +367,14 @@ class WayFinder:
         costs = dt * (1 + prices)
         costs[:, ~m.free[window]] = inf
         other_side = "left of" if self._s.pass_side == "right" else "right of"
-        found, again = list[Array](), np.zeros(far.shape, np.float32)
+        found = list[Array]()
+        again = np.zeros(far.shape, np.float32)
         while len(found) < (1 if is_empty else MOST_WAYS):
             cells = begin[None] if is_empty else cross_layers(costs + again, begin, far)
-            k, then = len(cells) - 1, cells[-1]
-            within, later = m.centers(low + cells[1:]), m.descend(low + then)[1:]
+            k = len(cells) - 1
+            then = cells[-1]
+            within = m.centers(low + cells[1:])
+            later = m.descend(low + then)[1:]
             points = np.vstack([at, within, later, m.end])
             if is_empty and m.sees(points[0], points[-1:])[0]:
                 points = np.linspace(at, m.end, len(points))
@@ -369,7 +396,8 @@ class WayFinder:
 
     def _head_for(self, m: Map, at: Point, points: Array) -> tuple[Heading, bool]:
         """The farthest of these `points` in sight, or a corner close by, and whether any is in sight."""
-        p, farthest = np.array(at), min(self._s.lookahead, _FARTHEST)
+        p = np.array(at)
+        farthest = min(self._s.lookahead, _FARTHEST)
         points = points[int(np.hypot(*(points - p).T).argmin()) :]
         lengths = _time(np.vstack([p, points]), 1.0)[1:]
         n = max(2, int(np.searchsorted(lengths, farthest)))
@@ -415,7 +443,8 @@ class Surroundings:
         m: Map,
         s: MPCSettings,
     ) -> None:
-        size, self.start = ceil(SEARCH_RADIUS / m.cell), m.find_cell(at)
+        size = ceil(SEARCH_RADIUS / m.cell)
+        self.start = m.find_cell(at)
         self.low = np.maximum(self.start - size, 0)
         self.window = tuple(map(slice, self.low, self.start + size + 1))
         walls = m.centers(np.argwhere(~m.free[self.window]) + self.low)
@@ -432,7 +461,8 @@ class Surroundings:
         apart = np.hypot(*(people[i, 0] - people[j, 0]).T)[:, None, None]
         between = GROUP_SECOND * (np.hypot(x, y) < apart / 2)
         self._prices = np.concatenate([prices, between]).astype(np.float32)
-        self._map, self.people = m, people
+        self._map = m
+        self.people = people
         self.places = np.concatenate([people, (people[i] + people[j]) / 2])
         self.around = np.concatenate([people, walls])
         moved = np.hypot(*(self.places[:, -1] - self.places[:, 0]).T)
@@ -445,7 +475,8 @@ class Surroundings:
 
         The first cell is `low`, as many as `shape`. The higher price counts where people overlap.
         """
-        n, stamps = self._prices.shape[1], self._prices[rows]
+        n = self._prices.shape[1]
+        stamps = self._prices[rows]
         prices = np.zeros((len(times), *(size + 2 * n for size in shape)), np.float32)
         places = self.places[rows][:, np.searchsorted(_TIMES[:-1], times)]
         cells = np.floor((places - self._map.corner) / self._map.cell).astype(int)
@@ -460,10 +491,12 @@ class Surroundings:
 
 def _find_pairs(people: Array, groups: Sequence[Hashable]) -> Cells:
     """Pairs of `people` of one of the `groups`, or who are near and walk alike, shape (2, n)."""
-    pairs, first = list[tuple[int, int]](), people[:, 0]
+    pairs = list[tuple[int, int]]()
+    first = people[:, 0]
     walks = (people[:, 1] - first) / _TICK
     for i, j in combinations(range(len(groups)), 2):
-        known, is_alike = {groups[i], groups[j]}, dist(walks[i], walks[j]) < GROUP_SPEED
+        known = {groups[i], groups[j]}
+        is_alike = dist(walks[i], walks[j]) < GROUP_SPEED
         reach = is_alike if None in known else 2 * (len(known) == 1)
         if dist(first[i], first[j]) < reach * GROUP_DISTANCE:
             pairs.append((i, j))
@@ -481,7 +514,8 @@ def cross_layers(costs: Any, begin: Any, far: Array) -> Array:
         across = np.minimum(layers[k], minimum_filter1d(layers[k], 3, 0) + _MOVE_PRICE)
         moved = minimum_filter1d(across, 3, 1) + _MOVE_PRICE
         layers[k + 1] = np.minimum(across, moved) + cost
-    ends, inside = layers + far, np.pad(far[1:-1, 1:-1] > 0, 1)
+    ends = layers + far
+    inside = np.pad(far[1:-1, 1:-1] > 0, 1)
     ends[:-1, inside] = inf
     k, *last = map(int, np.unravel_index(ends.argmin(), ends.shape))
     cells = [np.array(last)]
@@ -502,17 +536,20 @@ def _name(m: Map, way: Way, near: Surroundings, turns: Array) -> str:
     """A way in words: a door, the side of people whom it passes, and for whom it waits."""
     if not m.is_reached:
         return "to the nearest point that it can reach"
-    found, points = _find_door(m, way), way.at(_TIMES)
+    found = _find_door(m, way)
+    points = way.at(_TIMES)
     moved = np.hypot(*np.diff(way.points, axis=0).T)
     rest = np.diff(way.times)[moved == 0].sum()
     for number, places in enumerate(near.people):
-        offsets, walk = points - places, (places[1] - places[0]) / _TICK
+        offsets = points - places
+        walk = (places[1] - places[0]) / _TICK
         gaps = np.hypot(*offsets.T)
         k = gaps.argmin()
         turn = turns[number]
         if abs(turn) < pi / 2 or gaps[k] > _NAMED_WITHIN:
             continue
-        side, ahead = "right of" if turn > 0 else "left of", walk @ offsets[k]
+        side = "right of" if turn > 0 else "left of"
+        ahead = walk @ offsets[k]
         if abs(ahead) > _ALONG * gaps[k] * max(np.hypot(*walk), STANDING_SPEED):
             behind = "waits for" if rest > _WAITING else "behind"
             side = "in front of" if ahead > 0 else behind
@@ -567,8 +604,11 @@ def find_target(
     walk across the way, because they clear it themselves, nor for a person who stands on the goal. The
     nearest person counts.
     """
-    s, at, way = settings, complex(*position), complex(*goal) - complex(*position)
-    nearest, turn = abs(way), 1.0 + 0.0j
+    s = settings
+    at = complex(*position)
+    way = complex(*goal) - complex(*position)
+    nearest = abs(way)
+    turn = 1.0 + 0.0j
     time = s.dt * max(1 / s.gamma, sum(s.step_lengths))
     for zone in zones if way and s.head_on_share else ():
         walk = complex(*zone[7:9])
@@ -576,7 +616,8 @@ def find_target(
         h = ellipse_formula(*position, *zone[:5]) - s.r_robot - s.eps
         reach = min(nearest, (s.v_max + abs(walk)) * time)
         if h <= reach and across <= s.head_on_share * abs(way) * abs(walk):
-            nearest, turn = h, _turn_aside(at, way, zone, fixed, s)
+            nearest = h
+            turn = _turn_aside(at, way, zone, fixed, s)
     target = complex(*goal) + way * (turn - 1)  # exactly the goal without a turn
     return target.real, target.imag
 
@@ -586,7 +627,9 @@ def _turn_aside(
 ) -> complex:
     """By what the `way` is turned, to pass a person with this `zone`."""
     # complex numbers: the conjugate of u times v has the angle from u to v
-    a, b, margin = complex(*zone[:2]) - at, complex(*zone[2:4]) - at, s.r_robot + s.eps
+    a = complex(*zone[:2]) - at
+    b = complex(*zone[2:4]) - at
+    margin = s.r_robot + s.eps
     at_goal = ellipse_formula(
         way.real, way.imag, a.real, a.imag, b.real, b.imag, zone[4]
     )

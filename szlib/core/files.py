@@ -27,7 +27,8 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
     With `durable` its content survives a power failure (fsync). Two processes may write the same file: one of
     them wins. The folder must exist. Raises StorageError.
     """
-    path, data = Path(path), content.encode() if isinstance(content, str) else content
+    path = Path(path)
+    data = content.encode() if isinstance(content, str) else content
     unfinished = path.with_name(f"{MARKER}-part-{uuid.uuid4().hex}")
     advice = "make room, or choose a folder that is writable; files that were finished before are intact"
     with explain_errors(f"{path}: cannot be written", advice, StorageError, OSError):
@@ -84,7 +85,8 @@ def claim_folder(folder: str | Path, purpose: str) -> Path:
     StorageError : the folder is refused, or cannot be made or read.
     """
     folder = Path(folder)
-    failed, advice = f"{folder}: cannot be made or read", "choose another folder"
+    failed = f"{folder}: cannot be made or read"
+    advice = "choose another folder"
     with explain_errors(failed, advice, StorageError, OSError):
         folder.mkdir(parents=True, exist_ok=True)
         foreign = sorted(

@@ -44,7 +44,8 @@ _ROUNDING = 1e-6
 _LAST_SECOND = 1e11  # latest time [s]; up to here ticks are exact
 
 # If more samples than this share, and than so many, have no tick, times or ids were misread (assumed).
-_MOST_LOST, _FEW = 0.5, 20
+_MOST_LOST = 0.5
+_FEW = 20
 
 _BYTES_PER_TICK = 200  # memory of a tick while a table is brought to the clock [bytes] (measured: 188)
 
@@ -169,7 +170,8 @@ def _on_clock(
     """
     begin = np.flatnonzero(np.r_[True, ~within])
     size = np.diff(begin, append=len(t))
-    first_t, last_t = t[begin], t[begin + size - 1]
+    first_t = t[begin]
+    last_t = t[begin + size - 1]
     first = np.ceil((first_t - _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
     last = np.floor((last_t + _ROUNDING) * TICKS_PER_SECOND).astype(np.int64)
     count = np.maximum(last - first + 1, 0)
@@ -246,7 +248,9 @@ def _order_rows(
     day = frame["day"].astype("category").cat.codes.to_numpy()
     person = frame["id"].to_numpy()
     order = np.lexsort((time, person, day))
-    day, person, time = day[order], person[order], time[order]
+    day = day[order]
+    person = person[order]
+    time = time[order]
     same = (day[1:] == day[:-1]) & (person[1:] == person[:-1])
     step = np.diff(time)
     if (same & (step <= 0)).any():

@@ -46,8 +46,11 @@ def open_source(file: File) -> tuple[Source, Recipe]:
 
     A database gives the columns of the one table that can hold tracks.
     """
-    path, recipe, head = file.path, file.recipe, file.head
-    shape, readable = recognise(head, path, recipe), list[Source]()
+    path = file.path
+    recipe = file.recipe
+    head = file.head
+    shape = recognise(head, path, recipe)
+    readable = list[Source]()
     is_unknown = recipe.file_format is None
     tables = open_database(file) if is_unknown and shape.name == "jupedsim" else []
     if any({"frame", "id", "pos_x"} <= set(table.names) for table in tables):
@@ -86,7 +89,9 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
     Raises DataError where columns are missing or unclear, or a value of the recipe does not fit.  With `ask`
     a column that may tell recordings apart is such an error, too.
     """
-    named, path, decimal = recipe.has_people, source.where, source.decimal
+    named = recipe.has_people
+    path = source.where
+    decimal = source.decimal
     recipe = find_columns(source, recipe)
     values = {name: column_of(source, at) for name, at in recipe.columns.items()}
     numbers = {
@@ -95,9 +100,11 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
         if name in ("frame", "x", "y", "speed")
     }
     if "frame" in numbers:
-        t, day = numbers.pop("frame") * (1 / (recipe.frame_rate or 1.0)), None
+        t = numbers.pop("frame") * (1 / (recipe.frame_rate or 1.0))
+        day = None
     else:
-        tz, unit = recipe.tz or "UTC", recipe.time_unit
+        tz = recipe.tz or "UTC"
+        unit = recipe.time_unit
         t, day = to_times(values["t"], tz, unit, decimal)
     table = pl.DataFrame({"t": t, "id": to_ids(values["id"], path), **numbers})
     table = table.with_row_index("line", source.first_line)
@@ -119,7 +126,9 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
 
 def to_metres(table: pl.DataFrame, recipe: Recipe, path: Path) -> pl.DataFrame:
     """The `table` of file `path` with x, y (and speed) in metres, as a `recipe` says."""
-    x, y, origin = col.x, col.y, recipe.origin
+    x = col.x
+    y = col.y
+    origin = recipe.origin
     if recipe.homography:
         u, v, w = (a * x + b * y + c for a, b, c in recipe.homography)
         return table.with_columns(x=u / w, y=v / w)
@@ -138,7 +147,9 @@ def to_metres(table: pl.DataFrame, recipe: Recipe, path: Path) -> pl.DataFrame:
 
 def metres_in_degree(latitude: float) -> tuple[float, float]:
     """Metres in a degree of longitude, and of latitude, at a `latitude` on the ellipsoid of WGS 84."""
-    phi, axis, eccentricity = np.radians(latitude), 6_378_137.0, 6.694_379_990_14e-3
+    phi = np.radians(latitude)
+    axis = 6_378_137.0
+    eccentricity = 6.694_379_990_14e-3
     root = np.sqrt(1 - eccentricity * np.sin(phi) ** 2)
     north = axis * (1 - eccentricity) / root**3
     return float(np.radians(axis * np.cos(phi) / root)), float(np.radians(north))
@@ -155,7 +166,9 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
     DataError : a column is missing, doubled or ambiguous, frames have no rate, pixels no scale, degrees no
         origin; it says which columns look like what.
     """
-    names, where, given = source.names, f"{source.where}{source.head}", recipe.columns
+    names = source.names
+    where = f"{source.where}{source.head}"
+    given = recipe.columns
     at = {name: _candidates(name, recipe, names) for name in NAMES["columns"]}
     is_frame = "frame" in given or not at["t"] or recipe.frame_rate is not None
     time = "frame" if at["frame"] and "t" not in given and is_frame else "t"
@@ -190,7 +203,8 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
 
 def _check_units(where: str, recipe: Recipe) -> None:
     """Raise DataError where frames have no rate, times have one, or pixels no scale."""
-    columns, guesses = recipe.columns, dict[str, float]()
+    columns = recipe.columns
+    guesses = dict[str, float]()
     if "t" in columns and recipe.frame_rate is not None:
         raise DataError(
             f"{where}: its times are in seconds; leave frame_rate out, or name the column that counts "
@@ -251,7 +265,8 @@ def ask_about_recordings(
     is_mixed = rows.select((step.over("id") <= 0).any()).item()
     used = " ".join(map(str, recipe.columns.values()))
     for k, name in enumerate(source.names):
-        key, shown = _split_unit(name)[0], name or f"f{k}"
+        key = _split_unit(name)[0]
+        shown = name or f"f{k}"
         is_usual = by_name and key in NAMES["kinds"]["recordings"].split()
         is_used = shown in used or k in recipe.columns.values() or _TIMES.search(key)
         if is_used or not (is_mixed or is_usual):
@@ -313,7 +328,8 @@ def to_times(
     without a zone are those of `tz`.  Returns seconds, since 1970 where times are dates; and the local date
     of each where the column states its zone, else None.
     """
-    numbers, day = to_numbers(values, decimal), None
+    numbers = to_numbers(values, decimal)
+    day = None
     if values.dtype == String and 2 * numbers.null_count() > len(values):
         text = values.str.strip_chars(" \"'")
         dates = text.set(~text.str.contains(_DATE).fill_null(False), None).to_pandas()

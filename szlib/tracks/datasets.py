@@ -106,7 +106,8 @@ def label(data: str | Path | Sequence[str | Path]) -> str:
 
 def _find_named(name: str) -> list[Path]:
     """The files of a named data set, each with the right hash."""
-    data, folder = DATA_SETS[name], os.environ.get(DATA_DIR_VARIABLE)
+    data = DATA_SETS[name]
+    folder = os.environ.get(DATA_DIR_VARIABLE)
     store = pooch.create(
         path=Path(folder or pooch.os_cache("szlib")) / name,
         base_url=data.url,
@@ -122,7 +123,8 @@ def _find_named(name: str) -> list[Path]:
 
 def _expand(name: str | Path) -> list[Path]:
     """The regular files that a path stands for; reading a FIFO or a device would never end."""
-    path, shown = Path(name), printable(name)
+    path = Path(name)
+    shown = printable(name)
     expected = f"expected {_NAMED}, or a file, folder or glob of tracks"
     with explain_errors(f"{shown}: cannot be looked up", expected):
         pattern = str(path.relative_to(path.anchor))

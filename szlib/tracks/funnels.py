@@ -28,7 +28,8 @@ KEY = "funnel"
 # How the name of a stage begins that rejects nothing, but says what is implausible.
 WARNING = "warning: "
 # why a row is rejected
-MISSING, NO_ID = "missing or not a number", "id not a whole number"
+MISSING = "missing or not a number"
+NO_ID = "id not a whole number"
 # 2100-01-01; later time stamps are not seconds since 1970
 LAST_SECOND = 4_102_444_800.0
 FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
@@ -39,7 +40,8 @@ _FASTEST = (3.0, 6.0)
 _WALKS = 0.6  # smallest 90 % quantile of the speed where people walk [m/s]
 _MIN_STEPS = 10  # number of steps that allows a judgement
 # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
-_SPRINT, _JUMP = (12.5, 100.0)
+_SPRINT = 12.5
+_JUMP = 100.0
 _WALK = 1.2  # a usual walking speed [m/s]
 
 
@@ -123,7 +125,8 @@ def select(
     reason : why the other rows are rejected.
     """
     kept = frame[np.asarray(is_kept)].copy()
-    n, n_kept = len(frame), len(kept)
+    n = len(frame)
+    n_kept = len(kept)
     return attach(kept, [*get(frame), stage(name, n, n_kept, {reason: n - n_kept})])
 
 
@@ -178,7 +181,8 @@ def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
 
 def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
     """Why a row of a `table` as in `Rows` is rejected; null where it is usable."""
-    numbers, places = col("t", "x", "y"), col("x", "y")
+    numbers = col("t", "x", "y")
+    places = col("x", "y")
     reasons = {
         "missing or extra fields": col.ragged,
         MISSING: pl.any_horizontal(numbers.is_null()),
@@ -227,7 +231,8 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
     rows = rows[:, np.isfinite(rows).all(axis=0)]
     rows = rows[:, np.lexsort((rows[0], rows[1]))]
     step, person, *_ = np.diff(rows)
-    same, is_later = person == 0, np.diff(np.floor(rows[0])) != 0
+    same = person == 0
+    is_later = np.diff(np.floor(rows[0])) != 0
     # one row a second
     duration, person, *moved = np.diff(rows[:, np.r_[True, ~same | is_later]])
     by_second = person == 0

@@ -43,7 +43,9 @@ _HEAD = 1 << 16  # bytes of a text by which its day is found
 
 # A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
 # distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
-_FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
+_FASTEST = 5.0
+_BLUR = 0.5
+_SOON = 5.0
 
 Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
 """A function of rows, their area and the longest gap within a track [s]: the rows needed, sorted."""
@@ -225,7 +227,8 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
 
     Raises DataError where there is none, too many are rejected, or people cannot move like this.
     """
-    path, recipe = rows.path, rows.recipe
+    path = rows.path
+    recipe = rows.recipe
     table = rows.table.drop("speed", strict=False).collect()
     marked = table.with_columns(reason=rejection_reason(table))
     bad = marked.filter(col.reason.is_not_null())
@@ -248,7 +251,8 @@ def _count_rejected(rows: Rows, bad: pl.DataFrame, n: int) -> dict[str, int]:
     reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     if not reasons:
         return reasons
-    recipe, n_bad = rows.recipe, bad.height
+    recipe = rows.recipe
+    n_bad = bad.height
     line, reason = bad.select("line", "reason").row(0)
     held = ""
     if reason in (funnels.MISSING, funnels.NO_ID):
@@ -270,7 +274,8 @@ def _count_rejected(rows: Rows, bad: pl.DataFrame, n: int) -> dict[str, int]:
 
 def _show_field(rows: Rows, line: int, name: str) -> str:
     """The column that holds the quantity `name`, and what is in it at a `line`, for messages."""
-    columns, source = rows.recipe.columns, rows.source
+    columns = rows.recipe.columns
+    source = rows.source
     if source is None:
         return f"column {name}"
     at = columns["frame" if name == "t" and "frame" in columns else name]

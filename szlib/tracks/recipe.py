@@ -156,8 +156,10 @@ class Recipe:
 
     def over(self, base: Recipe) -> Recipe:
         """This recipe, completed by values of `base` where it has none."""
-        own, more = self.as_json(), base.as_json()
-        mine, others = dict(self.columns), dict(base.columns)
+        own = self.as_json()
+        more = base.as_json()
+        mine = dict(self.columns)
+        others = dict(base.columns)
         for given, kept, names in (
             (own, more, ("frame_rate", "time_unit")),
             (own, more, ("unit", "scale", *_ARRAYS)),

@@ -32,14 +32,16 @@ from .sources import File, Source, check_size, open_text
 # Central square of the ATC mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues).
 ATC_AREA = ((-18.5, -7.5), (-10.0, 8.0))
 # rows that are read before the size of all is checked, of a table and of a database
-_ROWS_AT_ONCE, _VALUES_AT_ONCE = 4096, 100
+_ROWS_AT_ONCE = 4096
+_VALUES_AT_ONCE = 100
 # Sessions of THOR-MAGNI are nearer to each other than this share of the usual step of the clock.
 _SESSION = 0.5
 
 # Frames a second of EWAP files: ETH; hotel, zara and students.
 _EWAP_RATES = (15.0, 25.0)
 # The rate follows from steps of at least this length [m], and is at most this share off.
-_EWAP_STEP, _EWAP_ERROR = 0.02, 0.1
+_EWAP_STEP = 0.02
+_EWAP_ERROR = 0.1
 # Frames a second to which PedPy brings footsteps: those of the clock.
 _VADERE_RATE = 10.0
 _PEDPY_ADVICE = (
@@ -53,16 +55,19 @@ ParsedFile = tuple[pl.DataFrame | pd.DataFrame | Source, dict[str, Any]]
 
 def open_shape(shape: Shape, file: File) -> tuple[Source, Recipe]:
     """The table of a `file` of a `shape`, and its recipe completed by what the file states."""
-    recipe, n = file.recipe, shape.n_fields
+    recipe = file.recipe
+    n = shape.n_fields
     if not shape.parse:
         return open_text(file, False if n else shape.has_header, n), recipe
-    reader, advice = "szlib", "fetch it again"
+    reader = "szlib"
+    advice = "fetch it again"
     try:
         if shape.parse in PARSERS:
             table, stated = PARSERS[shape.parse](file)
             recipe = recipe.over(Recipe(**stated))
         else:
-            reader, advice = "PedPy", _PEDPY_ADVICE
+            reader = "PedPy"
+            advice = _PEDPY_ADVICE
             table, stated = _load_by_pedpy(shape.parse, file)
             recipe = Recipe(**stated).over(recipe)
         return open_table(table, file.path), recipe
@@ -100,7 +105,8 @@ def open_table(table: Any, where: Path) -> Source:
 def open_arrow(file: File) -> Source:
     """A Parquet or Feather `file`, read by pyarrow: a damaged file can make Polars abort the process."""
     kind = "Parquet" if file.head.startswith("PAR1") else "Feather"
-    what, advice = f"{file.path}: damaged {kind}", "fetch or write the file again"
+    what = f"{file.path}: damaged {kind}"
+    advice = "fetch or write the file again"
     with explain_errors(what, advice):
         is_parquet = kind == "Parquet"
         opened = (pq.ParquetFile if is_parquet else pa.ipc.open_file)(file.plain)
@@ -271,7 +277,8 @@ def _parse_wide(file: File) -> ParsedFile:
 
 def _parse_level_x(file: File) -> ParsedFile:
     """The inD family: kinds of tracks, such as pedestrian, and the frame rate are in files beside it."""
-    table, stated = pl.read_csv(file.plain, infer_schema=False), dict[str, Any]()
+    table = pl.read_csv(file.plain, infer_schema=False)
+    stated = dict[str, Any]()
     stem, _, ending = file.path.name.partition("_tracks.")
     recording = file.path.with_name(f"{stem}_recordingMeta.{ending}")
     kinds = file.path.with_name(f"{stem}_tracksMeta.{ending}")
@@ -297,10 +304,12 @@ def _parse_nuscenes(file: File) -> ParsedFile:
     samples, instances, kinds = tables
     rows = []
     for each in json.loads(file.text()):
-        sample, person = samples[each["sample_token"]], each["instance_token"]
+        sample = samples[each["sample_token"]]
+        person = each["instance_token"]
         kind = kinds[instances[person]["category_token"]]["name"]
         if kind.startswith("human"):
-            t, scene = 1e-6 * sample["timestamp"], sample["scene_token"]
+            t = 1e-6 * sample["timestamp"]
+            scene = sample["scene_token"]
             rows.append((t, person, *each["translation"][:2], scene))
     return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), {}
 
@@ -315,7 +324,8 @@ PARSERS: dict[str, Callable[[File], ParsedFile]] = {
 
 def _load_by_pedpy(loader: str, file: File) -> ParsedFile:
     """The rows that function `loader` of PedPy gives, and frames a second."""
-    path, recipe = file.path, file.recipe
+    path = file.path
+    recipe = file.recipe
     with explain_errors(
         f"{path}: PedPy is missing", "install it: pip install 'szlib[pedpy]'"
     ):

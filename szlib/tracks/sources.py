@@ -35,7 +35,8 @@ from .recipe import SHAPES, Recipe, Shape
 LONGEST_LINE = 100_000
 # bytes of memory for each byte of a text: where it is read (measured: 5.8 with its columns), or scanned (1.3
 # to 1.9)
-_READ_FACTOR, SCAN_FACTOR = 6, 2
+_READ_FACTOR = 6
+SCAN_FACTOR = 2
 _RESERVE = 0.02  # share of a disk that unpacking leaves free
 CONTAINERS = ("PAR1", "ARROW1")  # first letters of Parquet and of Feather
 # What a recipe may say that a scan of rows cannot do: the file is then read as a whole.
@@ -146,7 +147,8 @@ def open_plain(path: Path, recipe: Recipe, size: int | None = None) -> Iterator[
     for fault, holds in faults.items():
         if holds:
             raise DataError(f"{shown}: {fault}")
-    plain, advice = path, "make room, or name another one in $TMPDIR"
+    plain = path
+    advice = "make room, or name another one in $TMPDIR"
     with unchanged_files([path]), ExitStack() as stack:
         with opening(path), path.open("rb") as stream:
             is_packed = stream.read(4).startswith((b"PK\3\4", b"\x1f\x8b"))
