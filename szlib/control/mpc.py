@@ -7,7 +7,9 @@ The guard
 *Walls.* Say that a state can stop if a robot that brakes as hard as it can along its path touches nothing
 fixed. It moves on a straight segment then, which ends where it rests. A control is applied only if the way
 during dt touches nothing fixed and the state after it can stop; else the robot brakes. If a state can stop,
-the state after dt of braking can, because its segment is a part of the first one. So by induction:
+the state after dt of braking can, because its segment is a part of the first one (and so are the pieces of
+which `Obstacles.bound` bounds the gap: it is up to 2 mm below the true one by the default settings). So by
+induction:
 
     from any state that can stop, the robot never touches a wall, whatever people do, appear or vanish, and
     whatever a sensor says about them,
