@@ -554,7 +554,7 @@ class Obstacles(NamedTuple):
         return Obstacles(self.groups + others.groups, self.r_robot)
 
     def chosen(self, is_near: Mask) -> Obstacles:
-        """Those that are near, by whether each of them is, shape (n,)."""
+        """Those of which `is_near` is True, shape (n,)."""
         groups = list[Group]()
         rest = is_near
         for kind, numbers, offsets in self.groups:
