@@ -342,11 +342,9 @@ class MPCCBF(Controller):
                 return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
-            points = heading.ways[0].at(np.array(s.times))
-            times = np.diff(s.times)
-            along = follow_velocities(
-                s, state[2:], np.diff(points, axis=0) / times[:, None]
-            )
+            times = np.array(s.times)
+            wanted = np.gradient(heading.ways[0].at(times), times, axis=0)[1:]
+            along = follow_velocities(s, state[2:], wanted)
             other = self._planner.plan(question, along)
             plan = min(plan, other, key=lambda each: each.rank)
             plan = plan._replace(timed_out=other.timed_out)
