@@ -197,6 +197,7 @@ class MPCCBF(Controller):
         self._near = self._fixed.chosen(is_near)
         self._near_from = at
         self._walls_near = self._fixed_of_disc.chosen(is_near).walls
+        self._room: tuple[Point, float] = at, -inf
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
@@ -407,8 +408,11 @@ class MPCCBF(Controller):
             dist(person.position, (x, y)) >= contact + time * hypot(*person.velocity)
             for person in scene.people
         )
-        room = self._walls_near.gaps(x, y).min(initial=inf)
-        return bool(room >= reach), is_body_far
+        at, room = self._room
+        if room - dist(at, (x, y)) < reach:
+            room = float(self._walls_near.gaps(x, y).min(initial=inf))
+            self._room = at, room = (x, y), room
+        return room - dist(at, (x, y)) >= reach, is_body_far
 
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
