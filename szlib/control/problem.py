@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core.checks import Array
 from .obstacles import Group, Obstacle, Obstacles, Point, Priority
-from .settings import MPCSettings
+from .settings import TOLERANCE, MPCSettings
 
 
 class Question(NamedTuple):
@@ -181,7 +181,7 @@ def list_conditions(
     if not kind.has_barrier:
         return (Condition(kind.priority, (0.0,) * s.N),)
     is_wall = has_floors and kind.priority == Priority.WALL
-    if not (is_wall and stop <= s.gamma and s.N_h == s.N):
+    if not (is_wall and stop <= s.gamma + TOLERANCE and s.N_h == s.N):
         decay = tuple((1 - s.gamma) ** m for m in lengths[: s.N_h])
         found.append(Condition(Priority.DECAY, decay))
     if is_wall:

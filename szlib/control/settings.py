@@ -223,12 +223,12 @@ class MPCSettings:
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
         reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
         own: dict[str, Any] = {
-            "gamma": 0.2,
+            "gamma": 0.1,
             "grid": grid,
             "jerk_weight": 6.0,
             "lookahead": reach + 1.0,
             "decay_price": 10.0,
-            "zone_price": 400.0,
+            "zone_price": 200.0,
             "body_gap": 0.2,
             "max_iterations": 8,
         }
