@@ -407,7 +407,7 @@ print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of mar
 # Bodies and walls cannot be bought, for any number of people.
 #
 # **What do you think?** The five people walk at 1 m/s towards three robots: the paper's, `among_people()` with its
-# `zone_price` of 400, and the same with a `zone_price` of 40. Which of them passes?
+# `zone_price` of 200, and the same with a `zone_price` of 40. Which of them passes?
 
 # %% jupyter={"source_hidden": true}
 # Figure
