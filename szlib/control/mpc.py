@@ -344,9 +344,9 @@ class MPCCBF(Controller):
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
             times = np.array(s.times)
-            wanted = np.gradient(heading.ways[0].at(times), times, axis=0)[1:]
-            along = follow_velocities(s, state[2:], wanted)
-            other = self._planner.plan(question, along)
+            targets = np.gradient(heading.ways[0].at(times), times, axis=0)[1:]
+            along_way = follow_velocities(s, state[2:], targets)
+            other = self._planner.plan(question, along_way)
             plan = min(plan, other, key=lambda each: each.rank)
             plan = plan._replace(timed_out=other.timed_out)
         if plan.violations == (inf,):

@@ -119,23 +119,23 @@ def build_horizon(settings: MPCSettings) -> Horizon:
 
 
 def follow_velocities(
-    s: MPCSettings, velocity: Sequence[float], wanted: Array
+    s: MPCSettings, velocity: Sequence[float], targets: Array
 ) -> Array:
-    """Inputs that bring a robot as near as it can to the velocities `wanted`, shape (N, 2) [m/s2].
+    """Inputs with which a robot reaches the velocities `targets` as nearly as it can, shape (N, 2) [m/s2].
 
-    The velocity changes on a straight line, and at no time the robot is too fast, by the settings `s`; one
-    that is too fast now slows down as it can.
+    Each change of velocity has the direction of its target. The robot is at no time too fast; one that is too
+    fast now slows down as it can.
 
     Parameters
     ----------
     s : settings of the controller.
     velocity : of the robot now [m/s].
-    wanted : at the end of each step, shape (N, 2) [m/s].
+    targets : velocities at the end of each step, shape (N, 2) [m/s].
     """
     v = velocity
     slowest = hypot(*velocity)
     plan = list[Point]()
-    ends = zip(wanted.tolist(), s.step_lengths, s.times[1:], strict=True)
+    ends = zip(targets.tolist(), s.step_lengths, s.times[1:], strict=True)
     for (wx, wy), length, time in ends:
         dt = s.dt * length
         limit = max(s.v_max, slowest - s.a_max * time)
