@@ -91,7 +91,7 @@ def test_what_the_paper_does_not_give_is_assumed() -> None:
 
 def test_the_settings_among_people_look_3_s_ahead_and_have_a_price_of_decay() -> None:
     s = szlib.MPCSettings.among_people()
-    assert (s.gamma, s.jerk_weight, s.body_gap) == (0.2, 6.0, 0.2)
+    assert (s.gamma, s.jerk_weight, s.body_gap) == (0.1, 6.0, 0.2)
     assert s.decay_price < s.zone_price < np.inf
     assert s.times[-1] == pytest.approx(3.0) and (s.N, s.N_h) == (14, 14)
     assert s.lookahead == pytest.approx(4.0) and 0 < s.decay_price < np.inf

@@ -156,14 +156,14 @@ def test_a_start_beside_a_wall_leaves_it_but_not_across_the_wall() -> None:
 
 
 def test_half_planes_and_a_users_obstacles_are_on_the_map() -> None:
-    class Table(szlib.control.Obstacle):
+    class Pillar(szlib.control.Obstacle):
         @staticmethod
         def distance(x, y, t, px, py, radius):
             return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - radius
 
     items = [
         HalfPlane((0.0, -2.0), (0.0, 1.0)),
-        Table(0.0, 0.0, 1.0),
+        Pillar(0.0, 0.0, 1.0),
         Wall(-1, 3, 1, 3),
     ]
     fixed = Obstacles.of(items, PLAIN)
