@@ -434,7 +434,8 @@ groups.agg(
 # A robot that walks between two people of a group disturbs them. ETH and THOR-MAGNI have labels that say which people
 # belong together. On the recorded ways there (`python -m studies.group_ways`), how often does the robot walk between two
 # people of one group, at most 3 m from each other? It is given the labels, or finds groups by distance and motion, or takes
-# everybody for single. The recorded people did it, too.
+# everybody for single. The recorded people did it, too. (This table is of `gamma=0.2, zone_price=400`, the settings of
+# `among_people()` before; all others are of today's.)
 
 # %% jupyter={"source_hidden": true}
 # Checks and a table
