@@ -221,7 +221,7 @@ def test_the_sentence_says_what_the_robot_does_and_why():
     assert sentence(make_world(n=40)).endswith(
         "and h may shrink by at most 5 % a step."
     )
-    assert "at most 20 % a step" in sentence(make_world(n=40, robots=[AMONG_PEOPLE]))
+    assert "at most 10 % a step" in sentence(make_world(n=40, robots=[AMONG_PEOPLE]))
     assert sentence(make_world("making_room", 20)).startswith("It goes back")
     there = make_world("passing", 95)
     assert sentence(there).startswith(
