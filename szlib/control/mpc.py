@@ -440,7 +440,7 @@ class MPCCBF(Controller):
             places = bodies.groups[0].numbers[overlaps, :2]
             towards = float(((places - begin) @ (path.points - begin).T).max())
             if towards > 0:
-                bound = min(bound, Bound(-towards, -towards))
+                bound = Bound(min(bound.lower, -towards), min(bound.seen, -towards))
         return bound
 
     def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
@@ -493,7 +493,10 @@ class MPCCBF(Controller):
         at = (x, y)
         heading = None
         if route is not None:
-            corners = check_array("route", route, (len(np.atleast_1d(route)), 2))
+            corners = check_array("route", route, (..., 2))
+            is_line = corners.ndim < 3
+            expected = "corners, shape (m, 2)"
+            require(is_line, "route", corners.shape, expected, SolverError)
             heading = self._ways.follow(at, goal, corners)
         if not heading and (route is not None or s.lookahead < inf):
             groups = [person.group for person in scene.people]
@@ -556,7 +559,7 @@ class MPCCBF(Controller):
             ("the goal cannot be reached", scene.goal, scene.h_of_goal),
         ):
             is_free = not scene.is_solid(*place)
-            require(is_free, fault, place, "outside of solids", SolverError)
+            require(is_free, "start and goal", place, "outside of solids", SolverError)
             if (h < 0).any():
                 i = int(h.argmin())
                 raise SolverError(

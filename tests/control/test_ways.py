@@ -376,8 +376,12 @@ def test_targets_of_small_robots_lie_on_this_side_of_thin_walls(radius) -> None:
 
 
 def test_a_route_of_a_wrong_shape_is_refused() -> None:
-    with pytest.raises(szlib.SolverError, match="route must have shape"):
+    with pytest.raises(
+        szlib.SolverError, match=r"route must be corners, shape \(m, 2\)"
+    ):
         szlib.MPCCBF(ZONE).step(START, (3.0, 0.0), route=np.zeros((2, 2, 2)))
+    with pytest.raises(szlib.SolverError, match="route must be numbers of shape"):
+        szlib.MPCCBF(ZONE).step(START, (3.0, 0.0), route=[(0.0, 0.0), (1.0,)])
 
 
 # --- through space and time -------------------------------------------------------------------------
