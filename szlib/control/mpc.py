@@ -78,7 +78,7 @@ from .people import (
     as_ellipse,
     list_knots,
 )
-from .planner import Plan, Planner
+from .planner import FEW, Plan, Planner, find_reach
 from .problem import (
     Question,
     build_horizon,
@@ -92,7 +92,6 @@ from .verification import AT_REST
 from .walls import find_solids, read_walls
 from .ways import Heading, WayFinder, find_target
 
-_FEW = 24  # up to this number all obstacles are in the problem, of more those that are near
 _BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
 
 
@@ -444,18 +443,17 @@ class MPCCBF(Controller):
         return bound
 
     def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
-        """Take what can matter among everything fixed. Looked for once a metre: see `Obstacles.find_near`."""
+        """Take what can matter within the horizon among everything fixed; looked for once a metre."""
         s = self._s
         speed = hypot(vx, vy)
         is_near = dist((x, y), self._near_from) <= 1.0 and speed <= s.v_max
-        if self._fixed.size <= _FEW or is_near:
+        if self._fixed.size <= FEW or is_near:
             return
-        longest = max(s.step_lengths)
         speed = max(s.v_max, speed)
-        time = s.times[-1] + 2 * longest * s.dt / (1 - (1 - s.gamma) ** longest)
-        time = max(time, 2 * s.dt + speed / s.a_max)  # until it rests
-        reach = s.r_robot + s.eps + speed * time + 1.0
-        self._take_near(self._fixed.find_near(x, y, reach), (x, y))
+        reach = find_reach(s, speed) + speed * s.times[-1]
+        rest = s.r_robot + s.eps + speed * (2 * s.dt + speed / s.a_max)
+        distances = self._fixed.find_distances(x, y)
+        self._take_near(distances <= max(reach, rest) + 1.0, (x, y))
 
     def _make_scene(
         self,

@@ -627,22 +627,26 @@ class Obstacles(NamedTuple):
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
         return Bound(lower.min(), gaps[:, _PARTS::_PARTS].min())
 
-    def find_near(self, x: float, y: float, reach: float) -> Mask:
-        """Whether the way s to each obstacle may be at most `reach` from (`x`, `y`) [m], shape (n,).
+    def find_distances(self, x: Any, y: Any) -> Array:
+        """Lower bound of the way s from (`x`, `y`) to each obstacle, shape (n, ...) [m].
 
-        An obstacle with the velocity w can be left out while its way s >= r_robot + margin + (v + w) (T +
-        dt/gamma), with the horizon T, and dt and gamma of the longest step: then its rows hold whatever a
-        robot does that is no faster than v. The way is the distance, but for a wall. With d the approximate
-        distance to a wall of length L, s = L/2 (sqrt(1 + 4 d/L) - 1), so that d = F(s) = s + s^2/L. It
-        changes by no more than the robot moves (`szlib.control.differential_drive`), and is at least 0.7
-        times the Euclidean distance. With S = r_robot + eps, and r_robot + margin <= F(S),
+        An obstacle with the velocity w can be left out of a step of dt that begins where its way s >=
+        r_robot + margin + 2 (v + w) dt/gamma: then its rows hold whatever a robot does that is no faster than
+        v. The way is the distance, but for a wall. With d the approximate distance to a wall of length L,
+        s = L/2 (sqrt(1 + 4 d/L) - 1), so that d = F(s) = s + s^2/L. It changes by no more than the robot
+        moves (`szlib.control.differential_drive`), and is at least 0.7 times the Euclidean distance. With
+        S = r_robot + eps, and r_robot + margin <= F(S),
 
             gamma h(x_k) >= gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
                          >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
 
         A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m.
+
+        Parameters
+        ----------
+        x, y : position, numbers or arrays of one shape [m].
         """
-        return np.asarray(0.7 * self._collect("gap", x, y, 0.0) <= reach)
+        return 0.7 * self._collect("gap", x, y, 0.0)
 
     def _collect(
         self, formula: str, x: Any, y: Any, t: Any, *, is_barrier: bool = False

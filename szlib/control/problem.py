@@ -222,6 +222,9 @@ def _linearise_kind(
     settings: MPCSettings, kind: Any, has_floors: bool, n: int, count: int
 ) -> Any:
     """(positions, numbers and offsets) -> (bounds, slopes) of all conditions on `n` obstacles of a kind."""
+    if n > 1:
+        of_one = _linearise_kind(settings, kind, has_floors, 1, count)
+        return of_one.map(n, [True, False], [False, False])
     at = ca.SX.sym("at", 2, settings.N + 1)
     numbers = ca.SX.sym("numbers", count + 1)
     values = _write_conditions(settings, kind, has_floors, numbers, at)
@@ -229,8 +232,7 @@ def _linearise_kind(
     moves = ca.DM(np.kron(build_horizon(settings).to_positions, np.eye(2)))
     slopes = (ca.jacobian(values, ca.vec(at[:, 1:])) @ ca.sparsify(moves)).T
     results = [-values, ca.densify(slopes)]
-    of_one = ca.Function("rows", [at, numbers], results, {"cse": True})
-    return of_one.map(n, [True, False], [False, False])
+    return ca.Function("rows", [at, numbers], results, {"cse": True})
 
 
 # Largest multiplier of the speed limit. Rows that contradict each other give huge ones, which would spoil

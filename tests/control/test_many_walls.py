@@ -9,7 +9,8 @@ import pytest
 from studies.distances import euclidean_to_segment
 
 import szlib
-from szlib.control import HalfPlane, Obstacles, Wall, advance, mpc
+from szlib.control import HalfPlane, Obstacles, Wall, advance, mpc, planner
+from szlib.control.problem import follow_velocities
 from szlib.core.checks import Array
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
@@ -61,7 +62,8 @@ def test_the_plan_is_that_with_all_walls(
     for k in range(40):
         a = near.step(state, GOAL, [person.after(0.1 * k)])
         with monkeypatch.context() as patched:
-            patched.setattr(mpc, "_FEW", 1000)
+            for module in (mpc, planner):
+                patched.setattr(module, "FEW", 1000)
             b = whole.step(state, GOAL, [person.after(0.1 * k)])
         assert a.inputs == pytest.approx(b.inputs, abs=1e-4)
         assert a.h.shape == b.h.shape == (91,) and a.residual.shape == b.residual.shape
@@ -77,18 +79,53 @@ def test_the_plan_is_that_with_all_walls(
         assert [getattr(a, c) for c in claims] == [getattr(b, c) for c in claims]
         assert a.verify().ok, a.verify().faults
         state = advance(state, a.control, 0.1)
+    of_near, of_whole = (
+        {key[2][1] for key in each._planner._programs} for each in (near, whole)
+    )
+    assert of_whole == {90} and max(of_near) < 85
+
+
+@pytest.mark.parametrize("seed", (1, 2, 4, 5))
+def test_a_plan_that_leaves_its_guess_meets_the_walls_that_it_did_not_know(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The guess leads away from the goal, so that the first problem lacks the walls on the way."""
+    rng = np.random.default_rng(seed)
+    walls = scattered(200, seed, size=20.0)
+    fixed = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG_PEOPLE)._fixed
+    nobody = Obstacles((), AMONG_PEOPLE.r_robot)
+    state, target = (*START, *rng.uniform(-0.7, 0.7, 2)), (4.0, 2.5)
+    question = planner.Question(state, target, (0.0, 0.0), nobody, fixed)
+    backwards = np.tile((-0.8, -0.6), (AMONG_PEOPLE.N, 1))
+    away = follow_velocities(AMONG_PEOPLE, state[2:], backwards)
+    asked = list[int]()
+    of_some = planner.Planner._plan_among
+
+    def count(self: Any, question: Any, guess: Array) -> Any:
+        asked.append(question.fixed.size)
+        return of_some(self, question, guess)
+
+    monkeypatch.setattr(planner.Planner, "_plan_among", count)
+    plan = planner.Planner(AMONG_PEOPLE).plan(question, away)
+    assert asked == sorted(asked) and len(asked) > 1 and asked[-1] < 200
+    program = planner.Planner(AMONG_PEOPLE).prepare(question, has_floors=True)
+    program.inputs[:] = plan.inputs
+    program.evaluate()
+    assert program.is_violated() == plan.is_relaxed
+    if plan.is_relaxed:
+        assert program.sum_violations() == pytest.approx(plan.violations, abs=1e-4)
 
 
 def test_no_move_makes_an_obstacle_out_of_reach_matter() -> None:
     """Its barrier condition holds wherever the robot goes within the horizon."""
     rng, v = np.random.default_rng(1), 1.0
-    reach = S.r_robot + S.eps + v * S.dt * (2 / S.gamma + S.N)
+    reach = planner.find_reach(S, v) + v * S.dt * S.N
     fixed = [Wall(-half, 0.0, half, 0.0) for half in (5e-4, 0.05, 0.5, 2.0, 20.0)]
     for each in [*fixed, HalfPlane((0.0, 0.0), (0.0, 1.0))]:
         table = Obstacles.of([each], S)
         half = each.numbers[2] if isinstance(each, Wall) else 1.0
         points = rng.uniform(-12 - half, 12 + half, (3000, 2)).tolist()
-        out = np.array([p for p in points if not table.find_near(*p, reach).any()])
+        out = np.array([p for p in points if table.find_distances(*p) > reach])
         assert len(out) > 100
         edge = out[np.argsort(np.abs(np.hypot(*out.T) - reach))][:500]
         for step in (0.0, (S.N - 1) * v * S.dt):

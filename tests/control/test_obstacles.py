@@ -246,7 +246,7 @@ def test_no_distance_changes_by_more_than_the_robot_and_the_obstacle_move():
 
 @pytest.mark.parametrize("length", [1e-3, 0.1, 1.0, 10.0, 100.0])
 def test_the_way_to_a_wall_changes_with_the_robot_and_is_not_far_below_the_gap(length):
-    """As `Obstacles.find_near` proves of s, with d = s + s^2 / L."""
+    """As `Obstacles.find_distances` proves of s, with d = s + s^2 / L."""
     rng, ends = np.random.default_rng(6), (-length / 2, 0.0, length / 2, 0.0)
     p = rng.normal(size=(20000, 2)) * (length + np.geomspace(1e-3, 50, 20000))[:, None]
     q = p + rng.normal(0, 0.2, p.shape)
