@@ -13,8 +13,9 @@ import pytest
 import shapely
 
 import szlib
-from szlib.control import HalfPlane, advance
+from szlib.control import Body, HalfPlane, Obstacles, advance
 from szlib.control.controller import find_stopping_path
+from szlib.control.obstacles import Group, Path
 
 ZONE = szlib.Ellipse((-0.05, 0.017), (1.084, 0.625), -0.28)
 BODY = 0.25
@@ -260,6 +261,25 @@ def test_the_robot_never_moves_towards_a_body_that_it_overlaps(name: str) -> Non
             assert k or step.passively_safe, "from rest it can always stay"
             own = controller.robot.advance(own, step.control, dt)
     assert found > 80
+
+
+def test_bodies_that_overlap_and_bodies_that_do_not_are_bounded_number_by_number() -> (
+    None
+):
+    """One body is met half way, between two points of the path; another is overlapped and neared by 1 cm."""
+    controller = build("default")
+    path = Path(np.array([(0.0, 0.0), (1.0, 0.0)]), np.array([0.0, 0.1]), np.zeros(1))
+    reach = controller.settings.r_robot + BODY
+    met, overlapped = [0.5, reach - 0.02, 0.0, 0.0], [0.01, 0.3, 0.0, 0.0]
+    found = []
+    for rows in ([met], [overlapped], [met, overlapped]):
+        group = Group(Body, np.array(rows), np.full(len(rows), reach))
+        bodies = Obstacles((group,), controller.settings.r_robot)
+        found.append(controller._bound_bodies(bodies, path))
+    alone, neared, both = found
+    assert alone.lower < -0.02 and alone.seen > 0.1
+    assert neared == pytest.approx((-0.01, -0.01))
+    assert both == pytest.approx((alone.lower, -0.01))
 
 
 def test_a_robot_that_rests_is_passively_safe_whoever_comes() -> None:
