@@ -60,7 +60,6 @@ from .controller import Controller, StepClock, find_stopping_path
 from .obstacles import (
     Bound,
     Group,
-    Mask,
     Obstacle,
     Obstacles,
     Path,
@@ -78,7 +77,7 @@ from .people import (
     as_ellipse,
     list_knots,
 )
-from .planner import FEW, Plan, Planner, find_reach
+from .planner import FEW, Plan, Planner, find_reach_time
 from .problem import (
     Question,
     build_horizon,
@@ -189,13 +188,13 @@ class MPCCBF(Controller):
         self._fixed = Obstacles.of(items, self._s)
         self._fixed_of_disc = Obstacles.of(items, self.settings)
         self._ways = WayFinder(self._fixed, self._s)
-        self._take_near(np.full(len(items), True), (inf, inf))
+        self._take_near(np.zeros(len(items)), (inf, inf))
 
-    def _take_near(self, is_near: Mask, at: Point) -> None:
-        """Take these as what is fixed near the robot, and those among them that it can always stop before."""
-        self._near = self._fixed.chosen(is_near)
+    def _take_near(self, ways: Array, at: Point) -> None:
+        """Take what has a way <= 0 as near the robot, and what of this it can always stop before."""
+        self._near = self._fixed.chosen(ways)
         self._near_from = at
-        self._walls_near = self._fixed_of_disc.chosen(is_near).walls
+        self._walls_near = self._fixed_of_disc.chosen(ways).walls
         self._room: tuple[Point, float] = at, -inf
 
     def set_walls(self, walls: Any) -> None:
@@ -334,7 +333,8 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        question = Question(state, heading.target, last, scene.zones, self._near)
+        barriers = scene.zones.joined(self._near)
+        question = Question(state, heading.target, last, barriers)
         guess = self._plan + self._change
         if s.solver == "ipopt":
             inputs = solve_by_ipopt(s, question, guess.clip(-s.a_max, s.a_max))
@@ -434,7 +434,7 @@ class MPCCBF(Controller):
         if np.hypot(*np.ptp(path.points, axis=0)) <= AT_REST * self._s.dt:
             return Bound()
         overlaps = bodies.gaps(*begin) < -TOLERANCE
-        bound = bodies.chosen(~overlaps).bound(path)
+        bound = bodies.chosen(overlaps).bound(path)
         if overlaps.any():
             places = bodies.groups[0].numbers[overlaps, :2]
             towards = float(((places - begin) @ (path.points - begin).T).max())
@@ -450,10 +450,9 @@ class MPCCBF(Controller):
         if self._fixed.size <= FEW or is_near:
             return
         speed = max(s.v_max, speed)
-        reach = find_reach(s, speed) + speed * s.times[-1]
-        rest = s.r_robot + s.eps + speed * (2 * s.dt + speed / s.a_max)
-        distances = self._fixed.find_distances(x, y)
-        self._take_near(distances <= max(reach, rest) + 1.0, (x, y))
+        time = max(s.times[-1] + find_reach_time(s), 2 * s.dt + speed / s.a_max)
+        (ways,) = self._fixed.find_ways(np.array([x]), np.array([y])).T
+        self._take_near(ways - speed * time - 1.0, (x, y))
 
     def _make_scene(
         self,

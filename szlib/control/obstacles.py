@@ -264,6 +264,17 @@ class Obstacle:
         """
         return cls.distance(x, y, t, *numbers)
 
+    @staticmethod
+    def way(distance: Any, *numbers: Any) -> Any:
+        """How far a robot at this `distance` must move at least to reach the obstacle [m]; by default so far.
+
+        Parameters
+        ----------
+        distance : by `Obstacle.distance` [m].
+        numbers : of the obstacle.
+        """
+        return distance
+
     @classmethod
     def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
         """Boxes that hold all places nearer to obstacles than `offsets`: corners, shape (n, 2) each [m].
@@ -407,6 +418,16 @@ class Wall(Obstacle):
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """See `Obstacle.distance`: approximate beyond the ends."""
         return segment_formula(x, y, *numbers)
+
+    @staticmethod
+    def way(distance: Any, *numbers: Any) -> Any:
+        """See `Obstacle.way`; `distance` and `numbers` as there.
+
+        The way s, with d = s + s^2/L, changes by no more than the robot moves: see `differential_drive`.
+        """
+        xa, ya, xb, yb = numbers
+        length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+        return length / 2 * ((1 + 4 * distance / length) ** 0.5 - 1)
 
     @classmethod
     def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
@@ -553,14 +574,22 @@ class Obstacles(NamedTuple):
         """These, and then the `others`."""
         return Obstacles(self.groups + others.groups, self.r_robot)
 
-    def chosen(self, is_near: Mask) -> Obstacles:
-        """Those of which `is_near` is True, shape (n,)."""
+    def chosen(self, ways: Array, at_once: int = 1) -> Obstacles:
+        """Those with a way <= 0, and the nearest others of each group until `at_once` divides their number.
+
+        Parameters
+        ----------
+        ways : to each, or as an order, shape (n,) [m].
+        at_once : of which the number in each group is a multiple, as far as there are so many.
+        """
         groups = list[Group]()
-        rest = is_near
+        rest = ways
         for kind, numbers, offsets in self.groups:
             own, rest = np.split(rest, [len(offsets)])
-            if own.any():
-                groups.append(Group(kind, numbers[own], offsets[own]))
+            n = -(-np.count_nonzero(own <= 0) // at_once) * at_once
+            rows = np.sort(np.argsort(own)[:n])
+            if n:
+                groups.append(Group(kind, numbers[rows], offsets[rows]))
         return self._replace(groups=tuple(groups))
 
     @property
@@ -573,6 +602,12 @@ class Obstacles(NamedTuple):
     def size(self) -> int:
         """Number of obstacles."""
         return sum(len(group.offsets) for group in self.groups)
+
+    @property
+    def speeds(self) -> Array:
+        """The speed of each, shape (n,) [m/s]."""
+        found = [g.kind.speeds(g.numbers) for g in self.groups]
+        return np.concatenate([np.empty(0), *found])
 
     @property
     def items(self) -> tuple[Obstacle, ...]:
@@ -621,32 +656,36 @@ class Obstacles(NamedTuple):
             for each in (*path.points.T, path.times)
         )
         gaps = (self.h if is_barrier else self.gaps)(x, y, t)
-        speeds = np.concatenate([g.kind.speeds(g.numbers) for g in self.groups])
-        reach = np.hypot(np.diff(x), np.diff(y)) + speeds[:, None] * np.diff(t)
+        moved = self.speeds[:, None] * np.diff(t)
+        reach = np.hypot(np.diff(x), np.diff(y)) + moved
         bows = np.repeat(path.bows, _PARTS)
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
         return Bound(lower.min(), gaps[:, _PARTS::_PARTS].min())
 
-    def find_distances(self, x: Any, y: Any) -> Array:
-        """Lower bound of the way s from (`x`, `y`) to each obstacle, shape (n, ...) [m].
+    def find_ways(self, x: Array, y: Array, t: Any = 0.0) -> Array:
+        """How far a robot must move at least until h of each obstacle is 0, shape (n, k) [m].
 
-        An obstacle with the velocity w can be left out of a step of dt that begins where its way s >=
-        r_robot + margin + 2 (v + w) dt/gamma: then its rows hold whatever a robot does that is no faster than
-        v. The way is the distance, but for a wall. With d the approximate distance to a wall of length L,
-        s = L/2 (sqrt(1 + 4 d/L) - 1), so that d = F(s) = s + s^2/L. It changes by no more than the robot
-        moves (`szlib.control.differential_drive`), and is at least 0.7 times the Euclidean distance. With
-        S = r_robot + eps, and r_robot + margin <= F(S),
+        An obstacle with the velocity w can be left out of a step of dt that begins where this way is at least
+        2 (v + w) dt/gamma: then its rows hold whatever a robot does that is no faster than v. This is clear
+        where the way is h. It is not for a wall of length L: there d = F(s) = s + s^2/L, where s is the way
+        to the wall. With S the way to the wall where h = 0,
 
-            gamma h(x_k) >= gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
+            gamma h(x_k) = gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
                          >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
 
         A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m.
 
         Parameters
         ----------
-        x, y : position, numbers or arrays of one shape [m].
+        x, y : positions, shape (k,) [m].
+        t : their times from now [s].
         """
-        return 0.7 * self._collect("gap", x, y, 0.0)
+        found = [np.empty((0, len(x)))]
+        for kind, numbers, offsets in self.groups:
+            table = numbers.T[..., None]
+            ways = kind.way(kind.distance(x, y, t, *table), *table)
+            found.append(ways - kind.way(offsets, *numbers.T)[:, None])
+        return np.concatenate(found)
 
     def _collect(
         self, formula: str, x: Any, y: Any, t: Any, *, is_barrier: bool = False
@@ -665,15 +704,14 @@ class Obstacles(NamedTuple):
 
 
 def find_bodies(
-    zones: Obstacles, settings: MPCSettings, *, as_predicted: bool = False
+    obstacles: Obstacles, settings: MPCSettings, *, as_predicted: bool = False
 ) -> Obstacles:
-    """The bodies of the people who have these `zones`, for a robot with these `settings`.
+    """The bodies of the people whose zones are among `obstacles`, for a robot with these `settings`.
 
     At constant velocity, or `as_predicted`.
     """
-    own = [
-        numbers[:, 5 : None if as_predicted else 9] for _, numbers, _ in zones.groups
-    ]
+    last = None if as_predicted else 9
+    own = [g.numbers[:, 5:last] for g in obstacles.groups if g.kind is Zone]
     gap = settings.r_robot + settings.body_gap
     groups = (Group(Body, each, np.full(len(each), gap)) for each in own)
     return Obstacles(tuple(groups), settings.r_robot)

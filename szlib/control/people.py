@@ -460,8 +460,9 @@ class Tracker:
         is_slow = hypot(vx, vy) < self.walking_speed and not person.stands
         if heading is None or (is_slow and heading == atan2(vy, vx)):
             heading = last[0].heading if last else None
-        is_unknown = heading is None
-        return replace(person, id=name, heading=heading, heading_unknown=is_unknown)
+        known = {"id": name, "heading": heading, "heading_unknown": heading is None}
+        is_same = known.items() <= vars(person).items()
+        return person if is_same else replace(person, **known)
 
 
 def check_finite(name: str, value: Any, least: float = -1e300) -> float:

@@ -55,9 +55,9 @@ CONVERGED = 1e-3
 HARD_PRICE = 1e5
 # Rows with a larger value are left out of an iteration [m]; smaller where the plan cannot change so much.
 NEAR = 1.0
-FEW = 24  # up to this number everything fixed is in a problem, of more what is near
+FEW = 24  # up to so many obstacles are all in a problem, of more those that are near
 _SPARE = 0.5  # by which a problem at first looks farther than what can matter [m]
-_AT_ONCE = 16  # the number of obstacles is then a multiple of it, so that few problems are built
+_AT_ONCE = 16  # the numbers of walls and people are multiples of it, so that few problems are built
 _FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
 _EVERY = slice(None)
 _MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
@@ -252,15 +252,14 @@ class Program(LinearProblem):
         return float(self.cost[0] + np.maximum(self.lower, 0.0) @ self.prices)
 
 
-def find_reach(s: MPCSettings, speed: float) -> float:
-    """Distance beyond which no step of a plan can violate a row of something fixed [m].
+def find_reach_time(s: MPCSettings) -> float:
+    """Time in which a robot must reach h = 0 of an obstacle, so that its rows can be violated now [s].
 
-    It is that of `Obstacles.find_distances`, for the settings `s` and a robot of at most this `speed` [m/s].
+    See `Obstacles.find_ways`; with the settings `s`.
     """
     longest = max(s.step_lengths)
     gamma = min(s.gamma, s.a_max * s.dt / s.v_max)
-    seconds = 2 * longest * s.dt / (1 - (1 - gamma) ** longest)
-    return s.r_robot + s.eps + speed * seconds
+    return float(2 * longest * s.dt / (1 - (1 - gamma) ** longest))
 
 
 class Planner:
@@ -292,32 +291,30 @@ class Planner:
     def plan(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, from a `guess`, shape (N, 2) [m/s2].
 
-        Of many fixed obstacles, only those near the guess are in the problem. If the plan comes near others,
-        they join, and it is made again from there.
+        Of many obstacles, only those near the guess are in the problem. If the plan comes near others, they
+        join, and it is made again from there.
         """
-        fixed = question.fixed
-        if fixed.size <= FEW:
+        barriers = question.barriers
+        if barriers.size <= FEW:
             return self._plan_among(question, guess)
-        distances = self._find_distances(question, guess)
-        number = np.count_nonzero(distances <= _SPARE)
-        number = min(len(distances), -(-number // _AT_ONCE) * _AT_ONCE)
-        is_chosen = distances <= np.sort(distances)[:number].max(initial=0.0)
+        ways = self._find_ways(question, guess) - _SPARE
         while True:
-            some = question._replace(fixed=fixed.chosen(is_chosen))
+            some = question._replace(barriers=barriers.chosen(ways, _AT_ONCE))
             plan = self._plan_among(some, guess)
-            is_near = self._find_distances(question, plan.inputs) <= 0.0
-            if plan.timed_out or not (is_near & ~is_chosen).any():
+            after = self._find_ways(question, plan.inputs)
+            if plan.timed_out or not ((after <= 0.0) & (ways > 0.0)).any():
                 return plan
-            is_chosen |= is_near
+            ways = np.minimum(ways, after)
             guess = plan.inputs
 
-    def _find_distances(self, question: Question, inputs: Array) -> Array:
-        """By how much each fixed obstacle is too far from a plan to matter, shape (n,) [m]."""
+    def _find_ways(self, question: Question, inputs: Array) -> Array:
+        """How far a plan is from where each obstacle can matter, shape (n,) [m]; at most 0 where it can."""
         s = self.settings
         states = build_horizon(s).states(np.array(question.state), inputs)
         x, y = states[:, :2].T
+        ways = question.barriers.find_ways(x, y, np.array(s.times)).min(axis=1)
         speed = np.hypot(*states[:, 2:].T).max()
-        return question.fixed.find_distances(x, y).min(axis=1) - find_reach(s, speed)
+        return ways - (speed + question.barriers.speeds) * find_reach_time(s)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, with all its obstacles.
@@ -336,7 +333,7 @@ class Planner:
         """The program of a `question`; `has_floors` as of `LinearProblem`."""
         obstacles = question.barriers
         if has_floors:
-            bodies = find_bodies(question.zones, self.settings, as_predicted=True)
+            bodies = find_bodies(obstacles, self.settings, as_predicted=True)
             obstacles = obstacles.joined(bodies)
         groups = obstacles.groups
         key = has_floors, *[(kind, *of.shape) for kind, of, _ in groups]

@@ -27,19 +27,13 @@ class Question(NamedTuple):
     state : (x, y, vx, vy) of the robot [m, m/s].
     target : (x, y), which attracts the plan [m].
     last : control of the step before [m/s2].
-    zones, fixed : of people, and everything else with a barrier condition.
+    barriers : everything with a barrier condition.
     """
 
     state: Sequence[float]
     target: Sequence[float]
     last: Sequence[float]
-    zones: Obstacles
-    fixed: Obstacles
-
-    @property
-    def barriers(self) -> Obstacles:
-        """Everything with a barrier condition."""
-        return self.zones.joined(self.fixed)
+    barriers: Obstacles
 
 
 class Motion(NamedTuple):

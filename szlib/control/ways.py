@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from cmath import phase, rect
 from collections.abc import Hashable, Iterator, Sequence
-from itertools import combinations
 from math import acos, ceil, dist, hypot, inf, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -491,16 +490,16 @@ class Surroundings:
 
 def _find_pairs(people: Array, groups: Sequence[Hashable]) -> Cells:
     """Pairs of `people` of one of the `groups`, or who are near and walk alike, shape (2, n)."""
-    pairs = list[tuple[int, int]]()
-    first = people[:, 0]
-    walks = (people[:, 1] - first) / _TICK
-    for i, j in combinations(range(len(groups)), 2):
-        known = {groups[i], groups[j]}
-        is_alike = dist(walks[i], walks[j]) < GROUP_SPEED
-        reach = is_alike if None in known else 2 * (len(known) == 1)
-        if dist(first[i], first[j]) < reach * GROUP_DISTANCE:
-            pairs.append((i, j))
-    return np.array(pairs, int).reshape(-1, 2).T
+    numbers = dict[Hashable, int]({None: 0})
+    own = np.array([numbers.setdefault(each, len(numbers)) for each in groups], int)
+    i, j = np.triu_indices(len(own), 1)
+    apart, unlike = (
+        np.hypot(*(each[i] - each[j]).T)
+        for each in (people[:, 0], (people[:, 1] - people[:, 0]) / _TICK)
+    )
+    is_known = (own[i] > 0) & (own[j] > 0)
+    reach = np.where(is_known, 2 * (own[i] == own[j]), unlike < GROUP_SPEED)
+    return np.stack([i, j])[:, apart < reach * GROUP_DISTANCE]
 
 
 def cross_layers(costs: Any, begin: Any, far: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Of many walls only those in reach are in the problem; plans, claims and reports stay about all of them."""
+"""Only obstacles in reach are in the problem of many; plans and claims stay about all of them."""
 
 from __future__ import annotations
 
@@ -85,6 +85,29 @@ def test_the_plan_is_that_with_all_walls(
     assert of_whole == {90} and max(of_near) < 85
 
 
+@pytest.mark.parametrize("settings", [S, AMONG_PEOPLE], ids=["default", "people"])
+def test_the_plan_is_that_with_everybody(
+    monkeypatch: pytest.MonkeyPatch, settings: szlib.MPCSettings
+) -> None:
+    """Of a crowd that walks, most are too far away to matter."""
+    rng, state = np.random.default_rng(3), np.array([0.0, 0.0, 0.3, 0.1])
+    places = rng.uniform(-20, 20, (60, 2))
+    places = places[np.hypot(*places.T) > 3.0]
+    people = np.hstack([places, rng.uniform(-0.8, 0.8, places.shape)])
+    near, whole = (szlib.MPCCBF(ZONE, settings=settings) for _ in range(2))
+    for _ in range(40):
+        a = near.step(state, GOAL, people)
+        with monkeypatch.context() as patched:
+            patched.setattr(planner, "FEW", 1000)
+            b = whole.step(state, GOAL, people)
+        assert a.inputs == pytest.approx(b.inputs, abs=1e-4)
+        assert a.status == b.status and a.verify().ok, a.verify().faults
+        state = advance(state, a.control, 0.1)
+        people[:, :2] += 0.1 * people[:, 2:]
+    sizes = {key[1][1] for key in near._planner._programs if len(key) > 1}
+    assert max(sizes) < 40 < len(people)
+
+
 @pytest.mark.parametrize("seed", (1, 2, 4, 5))
 def test_a_plan_that_leaves_its_guess_meets_the_walls_that_it_did_not_know(
     seed: int, monkeypatch: pytest.MonkeyPatch
@@ -93,16 +116,15 @@ def test_a_plan_that_leaves_its_guess_meets_the_walls_that_it_did_not_know(
     rng = np.random.default_rng(seed)
     walls = scattered(200, seed, size=20.0)
     fixed = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG_PEOPLE)._fixed
-    nobody = Obstacles((), AMONG_PEOPLE.r_robot)
     state, target = (*START, *rng.uniform(-0.7, 0.7, 2)), (4.0, 2.5)
-    question = planner.Question(state, target, (0.0, 0.0), nobody, fixed)
+    question = planner.Question(state, target, (0.0, 0.0), fixed)
     backwards = np.tile((-0.8, -0.6), (AMONG_PEOPLE.N, 1))
     away = follow_velocities(AMONG_PEOPLE, state[2:], backwards)
     asked = list[int]()
     of_some = planner.Planner._plan_among
 
     def count(self: Any, question: Any, guess: Array) -> Any:
-        asked.append(question.fixed.size)
+        asked.append(question.barriers.size)
         return of_some(self, question, guess)
 
     monkeypatch.setattr(planner.Planner, "_plan_among", count)
@@ -119,13 +141,15 @@ def test_a_plan_that_leaves_its_guess_meets_the_walls_that_it_did_not_know(
 def test_no_move_makes_an_obstacle_out_of_reach_matter() -> None:
     """Its barrier condition holds wherever the robot goes within the horizon."""
     rng, v = np.random.default_rng(1), 1.0
-    reach = planner.find_reach(S, v) + v * S.dt * S.N
+    reach = v * (planner.find_reach_time(S) + S.dt * S.N)
     fixed = [Wall(-half, 0.0, half, 0.0) for half in (5e-4, 0.05, 0.5, 2.0, 20.0)]
     for each in [*fixed, HalfPlane((0.0, 0.0), (0.0, 1.0))]:
         table = Obstacles.of([each], S)
         half = each.numbers[2] if isinstance(each, Wall) else 1.0
         points = rng.uniform(-12 - half, 12 + half, (3000, 2)).tolist()
-        out = np.array([p for p in points if table.find_distances(*p) > reach])
+        out = np.array(
+            [p for p in points if table.find_ways(*np.transpose([p])) > reach]
+        )
         assert len(out) > 100
         edge = out[np.argsort(np.abs(np.hypot(*out.T) - reach))][:500]
         for step in (0.0, (S.N - 1) * v * S.dt):

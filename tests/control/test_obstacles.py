@@ -245,15 +245,13 @@ def test_no_distance_changes_by_more_than_the_robot_and_the_obstacle_move():
 
 
 @pytest.mark.parametrize("length", [1e-3, 0.1, 1.0, 10.0, 100.0])
-def test_the_way_to_a_wall_changes_with_the_robot_and_is_not_far_below_the_gap(length):
-    """As `Obstacles.find_distances` proves of s, with d = s + s^2 / L."""
+def test_the_way_to_a_wall_changes_by_no_more_than_the_robot_moves(length):
     rng, ends = np.random.default_rng(6), (-length / 2, 0.0, length / 2, 0.0)
     p = rng.normal(size=(20000, 2)) * (length + np.geomspace(1e-3, 50, 20000))[:, None]
     q = p + rng.normal(0, 0.2, p.shape)
-    d = np.array([Wall.distance(*each.T, 0.0, *ends) for each in (p, q)])
-    s, moved = length / 2 * (np.sqrt(1 + 4 * d / length) - 1), q - p
-    assert (np.abs(s[1] - s[0]) <= np.hypot(*moved.T) + 1e-9).all()
-    assert (s[0] >= 0.7 * Wall.gap(*p.T, 0.0, *ends)).all()
+    s = [Wall.way(Wall.distance(*each.T, 0.0, *ends), *ends) for each in (p, q)]
+    assert (np.abs(s[1] - s[0]) <= np.hypot(*(q - p).T) + 1e-9).all()
+    assert (s[0] <= Wall.gap(*p.T, 0.0, *ends) + 1e-9).all()
 
 
 def test_a_zone_in_the_world_is_the_zone_placed_at_its_person():

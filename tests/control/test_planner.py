@@ -198,7 +198,7 @@ def scene_of(rng, n_walls=2, n_people=2, spread=2.0):
 
 def ask(s, state, target, zones, fixed):
     of_zones, of_fixed = Obstacles.of(zones, s), Obstacles.of(fixed, s)
-    return Question(tuple(state), target, (0.0, 0.0), of_zones, of_fixed)
+    return Question(tuple(state), target, (0.0, 0.0), of_zones.joined(of_fixed))
 
 
 @pytest.mark.parametrize("formulation", [{"N": 4, "N_h": 2}, GRID, PRICED], ids=str)
