@@ -460,7 +460,8 @@ class Tracker:
         is_slow = hypot(vx, vy) < self.walking_speed and not person.stands
         if heading is None or (is_slow and heading == atan2(vy, vx)):
             heading = last[0].heading if last else None
-        known = {"id": name, "heading": heading, "heading_unknown": heading is None}
+        is_unknown = heading is None
+        known: Any = {"id": name, "heading": heading, "heading_unknown": is_unknown}
         is_same = known.items() <= vars(person).items()
         return person if is_same else replace(person, **known)
 

@@ -314,7 +314,8 @@ class Planner:
         x, y = states[:, :2].T
         ways = question.barriers.find_ways(x, y, np.array(s.times)).min(axis=1)
         speed = np.hypot(*states[:, 2:].T).max()
-        return ways - (speed + question.barriers.speeds) * find_reach_time(s)
+        reach = (speed + question.barriers.speeds) * find_reach_time(s)
+        return np.asarray(ways - reach)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, with all its obstacles.
