@@ -574,7 +574,7 @@ class Obstacles(NamedTuple):
         """These, and then the `others`."""
         return Obstacles(self.groups + others.groups, self.r_robot)
 
-    def chosen(self, ways: Array | Mask, at_once: int = 1) -> Obstacles:
+    def chosen(self, ways: NDArray[Any], at_once: int = 1) -> Obstacles:
         """Those with a way <= 0, and the nearest others of each group until `at_once` divides their number.
 
         Parameters
