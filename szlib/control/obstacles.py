@@ -583,7 +583,7 @@ class Obstacles(NamedTuple):
         at_once : of which the number in each group is a multiple, as far as there are so many.
         """
         groups = list[Group]()
-        rest = ways
+        rest: Any = ways
         for kind, numbers, offsets in self.groups:
             own, rest = np.split(rest, [len(offsets)])
             n = -(-np.count_nonzero(own <= 0) // at_once) * at_once
