@@ -434,8 +434,7 @@ groups.agg(
 # A robot that walks between two people of a group disturbs them. ETH and THOR-MAGNI have labels that say which people
 # belong together. On the recorded ways there (`python -m studies.group_ways`), how often does the robot walk between two
 # people of one group, at most 3 m from each other? It is given the labels, or finds groups by distance and motion, or takes
-# everybody for single. The recorded people did it, too. (This table is of `gamma=0.2, zone_price=400`, the settings of
-# `among_people()` before; all others are of today's.)
+# everybody for single. The recorded people did it, too.
 
 # %% jupyter={"source_hidden": true}
 # Checks and a table
@@ -450,8 +449,8 @@ shares = crossing["mean"].loc[[*robots, "the person replaced"]].set_axis(known)
 shares.style.format("{:.1%}").set_caption("Ways on which a group was crossed, by what is known of groups")
 
 # %% [markdown]
-# The robot crosses a third as many groups as people do, and whether it knows of them hardly matters: the labels save one
-# way in a hundred. Companions are mostly so near each other that their zones leave no room between them. So it is the
+# The robot crosses a quarter as many groups as people do. Whether it knows of them does not matter here: all three rows
+# are the same. Companions are mostly so near each other that their zones leave no room between them. So it is the
 # zone that keeps the robot out of groups. The price of a group acts where people stand in a wide circle (chapter 12).
 #
 # ## Two wheels
