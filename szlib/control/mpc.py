@@ -452,7 +452,7 @@ class MPCCBF(Controller):
         speed = max(s.v_max, speed)
         time = max(s.times[-1] + find_reach_time(s), 2 * s.dt + speed / s.a_max)
         (ways,) = self._fixed.find_ways(np.array([x]), np.array([y])).T
-        self._take_near(ways - speed * time - 1.0, (x, y))
+        self._take_near(ways - (speed + self._fixed.speeds) * time - 1.0, (x, y))
 
     def _make_scene(
         self,

@@ -66,7 +66,9 @@ _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 _SOLVED = 1
 _VIOLATED = 2
 # No regularisation of convex programs; beside the exact penalty, a negligible quadratic one.
+# A program of ordinary crowds takes at most some 120 iterations, one that many people overlap 10,000.
 _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3, "eq_reduction": -1}
+_DAQP["iter_limit"] = 1000
 
 
 class Plan(NamedTuple):
@@ -361,7 +363,8 @@ class Planner:
             solved = program.solve()
             if solved is None:
                 self._on_speed[:] = 0.0
-                return Plan(program.inputs.copy(), inf, (inf,), True, False)
+                timed_out = self.budget.is_spent
+                return Plan(program.inputs.copy(), inf, (inf,), True, timed_out)
             step, is_relaxed = solved
             if before is not None and step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever

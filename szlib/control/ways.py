@@ -42,7 +42,7 @@ Cells = NDArray[np.intp]
 CELL = 0.15
 """Side of a cell [m] (assumed)."""
 MOST_CELLS = 250_000
-"""Number of cells of a map, without its margin; those of a larger one are larger (assumed)."""
+"""Number of cells of a map; those of a larger one are larger (assumed)."""
 SEARCH_RADIUS = 4.0
 SEARCH_TIME = 6.0
 """How far the search looks, from the robot [m], and in time [s] (assumed)."""
@@ -67,6 +67,8 @@ MOST_WAYS = 3
 _AROUND = 8.0
 _FARTHEST_WALL = 35.0
 _FARTHEST = 10.0  # of a target on a route [m]
+_MOST_POINTS = 100_000  # of a route; the pieces of a longer one are longer
+_MARGIN = 4  # cells around a map
 _CHUNK = 1_000_000  # cells that are measured at once
 # places of people who stand are rounded so, and a goal is the same if it moved less [m]
 _MOVED = 0.3
@@ -160,9 +162,13 @@ class Map:
         size = high - low
         self._reach = size / 2
         side = min(CELL, clearance / _MOST_SHARE)
-        self.cell = max(side, float(sqrt(size.prod() / MOST_CELLS)))
-        self.corner = low - 4 * self.cell
-        self.shape = tuple((np.ceil(size / self.cell).astype(int) + 8).tolist())
+        # so that MOST_CELLS = (size[0] / cell + 2 _MARGIN) (size[1] / cell + 2 _MARGIN)
+        most = MOST_CELLS - 4 * _MARGIN**2
+        half = _MARGIN * size.sum() / most
+        self.cell = max(side, float(half + sqrt(half**2 + size.prod() / most)))
+        self.corner = low - _MARGIN * self.cell
+        n = np.ceil(size / self.cell).astype(int) + 2 * _MARGIN
+        self.shape = tuple(n.tolist())
         covered = self._cover(fixed)[2:-2, 2:-2]
         self.free = np.pad(~covered | covered.all(), 2)
         self.blocked = ~self.free
@@ -316,7 +322,8 @@ class WayFinder:
         self._standing = None
         m.blocked = ~m.free
         line = shapely.LineString(np.vstack([route, goal, goal]))
-        line = shapely.segmentize(line, m.cell) if line.length else line
+        piece = max(m.cell, line.length / _MOST_POINTS)
+        line = shapely.segmentize(line, piece) if line.length else line
         points = shapely.get_coordinates(line)
         heading, is_seen = self._head_for(m, at, points)
         return heading if is_seen else None
@@ -499,7 +506,9 @@ def _find_pairs(people: Array, groups: Sequence[Hashable]) -> Cells:
     )
     is_known = (own[i] > 0) & (own[j] > 0)
     reach = np.where(is_known, 2 * (own[i] == own[j]), unlike < GROUP_SPEED)
-    return np.stack([i, j])[:, apart < reach * GROUP_DISTANCE]
+    # bodies that touch leave nothing between them
+    is_pair = (apart > 2 * BODY_RADIUS) & (apart < reach * GROUP_DISTANCE)
+    return np.stack([i, j])[:, is_pair]
 
 
 def cross_layers(costs: Any, begin: Any, far: Array) -> Array:

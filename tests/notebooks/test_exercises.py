@@ -307,6 +307,22 @@ def test_what_a_notebook_does_to_its_judges_changes_nothing(tmp_path):
     assert marks == {"velocity": 0, "speed_limit": minutes}
 
 
+def test_the_command_that_marks_gives_a_solved_sheet_all_its_points():
+    """Its first cell imports Matplotlib, as those of most sheets do; all its functions are the solutions."""
+    sheet = folders.NOTEBOOKS / "solutions" / "sheet1_tracks.ipynb"
+    command = [sys.executable, sheets.EXERCISES / "judges", sheet, "--seed", "1"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    points = sum(task.minutes for task in SHEETS["sheet1_tracks"])
+    assert f"{sheet}: {points} points" in done.stdout
+    assert "import matplotlib" in sheet.read_text(encoding="utf-8")
+
+
+def test_the_command_that_marks_names_a_sheet_that_is_missing(tmp_path):
+    command = [sys.executable, sheets.EXERCISES / "judges", tmp_path / "none.ipynb"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2 and "none.ipynb: no such file" in done.stderr
+
+
 # --- the closed loop ---------------------------------------------------------------------------------
 
 

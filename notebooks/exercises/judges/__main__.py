@@ -86,6 +86,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6), help="default: a new one")
     parser.add_argument("--out", type=Path, help="write a table (CSV)")
     given = parser.parse_args()
+    for file in given.files:
+        if not file.is_file():
+            parser.error(f"{file}: no such file; expected a sheet, .ipynb or .py")
     rows = []
     for file in given.files:
         marks = mark_sheet(file, given.seed)
