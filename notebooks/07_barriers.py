@@ -599,7 +599,7 @@ Markdown(
 #   least 5 cm outside the zone. $h < 0$ means that the robot comes closer than people do.
 # - **"A smaller gamma keeps a larger distance."** No. Before a person who stands, a robot that chooses its speed ends at the
 #   edge of the zone with every gamma. A smaller one slows it down earlier. (A robot that chooses its acceleration, with
-#   $N_h = 2$, ends a few centimetres before: see "Distance to an edge".)
+#   $N_h = 2$, ends some 10 cm before: see "Distance to an edge".)
 # - **"The barrier stops the robot."** Only if the person stands. If the person comes, $h$ falls although the robot
 #   stands still, and the condition requires that it goes back (chapter 11).
 

@@ -457,7 +457,7 @@ display(movie)
 # **Theory: when is a price exact?** For each hard constraint the solver computes a *multiplier* $\lambda$ (the "price" of
 # a row in chapter 08): how much the cost falls per metre by which the constraint gives way. If $p > \lambda$, giving way
 # costs more than it saves. Then the plan with a price is the plan with the hard constraint, wherever there is one
-# (Nocedal & Wright, *Numerical Optimization*, ch. 17). The prices of `among_people()` are 10 for a metre of decay and 400 for a
+# (Nocedal & Wright, *Numerical Optimization*, ch. 17). The prices of `among_people()` are 10 for a metre of decay and 200 for a
 # metre within a zone, each for 0.1 s: the robot enters a zone where waiting would cost more.
 #
 # **Why not a high price for walls?** Because prices are added up. Two people come along a wall. To give both 0.3 m more, the
@@ -492,7 +492,7 @@ shown.rename_axis(None).rename_axis(None, axis=1).style.format("{:.2f}").format(
 # %% [markdown]
 # The *social force* is a controller without barriers: people push the robot away, and its goal attracts it. It arrives
 # about as often as `among_people()`, and is in zones for much longer. The last row is what the recorded people did
-# themselves.
+# themselves: their time is not quite 1, because a way ends where its goal is 0.5 m away.
 
 # %% [markdown]
 # ## What the robot is bad at

@@ -425,8 +425,8 @@ groups.agg(
 # The rows of a controller differ in the zone (a body of 0.3 m, or Grand Central's learned one), the time step and
 # the limit of acceleration. Both MPC-CBF do far better than the others, and the learned zone is better than the
 # body alone, although these people were taught no zone. The controller among people arrives some 3 s earlier than
-# the paper's. It needs the acceleration: limited to 1 m/s² it collides more often than the paper's settings,
-# which keep farther away. So the paper's controller is a good choice where few people are near.
+# the paper's. It needs the acceleration: with the learned zone and 1 m/s² it collides more often than the paper's
+# settings, which keep farther away. So the paper's controller is a good choice where few people are near.
 
 # %% [markdown]
 # ## Around groups, not through them

@@ -384,7 +384,7 @@ def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
                 table.index,
                 share,
                 left=left,
-                label=kind,
+                label={"came": "appeared"}.get(kind, kind),
                 color=colour,
                 hatch=hatch,
                 edgecolor="white",

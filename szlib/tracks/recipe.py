@@ -18,7 +18,7 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 
-from ..core.errors import DataError
+from ..core.errors import DataError, warn
 from ..core.files import write_file
 from ..core.input_files import explain_errors, read_small, reading, require
 
@@ -249,8 +249,11 @@ def find_recipe(
     if recipe is None:
         paths = [Path(each) for each in files[:1] if isinstance(each, str | Path)]
         saved = [path.with_name(FILE_NAME) for path in paths]
-        found = [Recipe.load(path) for path in saved if path.is_file()]
-        recipe = found[0] if found else Recipe()
+        recipe = Recipe()
+        for path in filter(Path.is_file, saved):
+            recipe = Recipe.load(path)
+            how = arguments(recipe.as_json())
+            warn(f"read by {path}: {how:.120}; delete it to read files otherwise")
     given = {name: value for name, value in parameters.items() if value is not None}
     return Recipe(**given).over(recipe)
 

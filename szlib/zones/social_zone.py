@@ -50,6 +50,7 @@ from .uncertainty import (
     Uncertainty,
     count_by_side,
     describe_missing_sides,
+    describe_missing_speed,
     estimate_uncertainty,
 )
 from .verdict import Verdict, describe_missing_encounters, judge
@@ -360,14 +361,16 @@ class SocialZone:
 
     def missing_data(self, speed: float) -> str:
         """Describe the sides that lack encounters at a `speed` [m/s]; "" if none does."""
+        counts = self.side_counts
         if self.method == "respect" and self.uncertainty is not None:
-            return ""  # its intervals say what is missing
-        if self.side_counts is None:
+            # its intervals say what else is missing
+            return "" if counts is None else describe_missing_speed(counts, speed)
+        if counts is None:
             return (
                 "the quality of the zone is unknown: encounters were not counted by side (an older file, or "
                 "samples without `encounter`); fit it again"
             )
-        return describe_missing_sides(self.side_counts, speed)
+        return describe_missing_sides(counts, speed)
 
     def table(self) -> pd.DataFrame:
         """One row for each fitted speed.

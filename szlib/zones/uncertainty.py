@@ -115,14 +115,26 @@ def count_by_side(
     return pd.DataFrame(rows, columns=["speed", "encounters", *SIDES])
 
 
+def describe_missing_speed(counts: pd.DataFrame, speed: float) -> str:
+    """Say if a `speed` [m/s] is slower or faster than all encounters; "" if not.
+
+    `counts` are as from `count_by_side`.
+    """
+    seen = counts.loc[counts["encounters"] > 0, "speed"]
+    if seen.min() <= speed <= seen.max():
+        return ""
+    only = f" (only at {seen.min():g} to {seen.max():g} m/s)" if len(seen) else ""
+    return f"at {speed:g} m/s no encounters were counted{only}"
+
+
 def describe_missing_sides(counts: pd.DataFrame, speed: float) -> str:
     """Describe the sides with fewer than `MIN_ENCOUNTERS` encounters; "" if there are none.
 
     `counts` are as from `count_by_side`. If `speed` [m/s] lies between two of its rows, both must suffice.
     """
+    if missing := describe_missing_speed(counts, speed):
+        return missing
     known = counts["speed"]
-    if not known.min() <= speed <= known.max():
-        return f"at {speed:g} m/s no encounters were counted (only at {known.min():g} to {known.max():g} m/s)"
     near = known.isin(find_neighbours(known, speed))
     fewest = counts.loc[near, list(SIDES)].min()
     few = [

@@ -136,6 +136,24 @@ def test_every_condition_is_needed(careful, change, reason):
     assert any(reason in each for each in verdict.reasons)
 
 
+def test_a_speed_at_which_nobody_was_seen_is_undecided(careful):
+    """The posterior of "respect" has an interval at every speed, also where it saw nobody."""
+    zone = replace(careful, method="respect")
+    nobody = replace(zone, side_counts=zone.side_counts.assign(encounters=0))
+    seen = f"(only at {SPEED:g} to {SPEED:g} m/s)"
+    assert not any("counted" in reason for reason in zone.verdict(SPEED).reasons)
+    for judged, speed, end in (
+        (zone, 3.0, f" {seen}"),
+        (zone, 0.2, f" {seen}"),
+        (nobody, SPEED, ""),
+    ):
+        verdict = judged.verdict(speed)
+        assert verdict == "undecided"
+        assert verdict.reasons[0] == (
+            f"at {speed:g} m/s no encounters were counted{end}"
+        )
+
+
 def test_a_tracker_that_loses_people_is_undecided(careful):
     """Unless respect shows beyond the distance that it resolves, and the zone reaches farther than that."""
     sensor = szlib.encounters.SensorCheck(50, 9000, 0.6, 0.45, 0.73, 0.01, 0.6)
