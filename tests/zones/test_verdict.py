@@ -12,6 +12,7 @@ from studies.imposed_zone import PairedSamples
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
+from szlib.zones.ellipses import EllipseZone
 from szlib.zones.respect_test import collect_approaches, fit_radius
 from szlib.zones.verdict import describe_missing_encounters
 
@@ -138,7 +139,8 @@ def test_every_condition_is_needed(careful, change, reason):
 
 def test_a_speed_at_which_nobody_was_seen_is_undecided(careful):
     """The posterior of "respect" has an interval at every speed, also where it saw nobody."""
-    zone = replace(careful, method="respect")
+    shape = EllipseZone(careful.ellipses)
+    zone = replace(careful, method="respect", shape=shape)
     nobody = replace(zone, side_counts=zone.side_counts.assign(encounters=0))
     seen = f"(only at {SPEED:g} to {SPEED:g} m/s)"
     assert not any("counted" in reason for reason in zone.verdict(SPEED).reasons)
