@@ -265,7 +265,13 @@ class StepClock:
             self._periods.append(called - self._called if is_timed else self._elapsed)
         self._called = called
         if stamps is not None:
-            late = np.abs(np.asarray(stamps, float) - self.now).max(initial=0.0)
+            try:
+                late = np.abs(np.asarray(stamps, float) - self.now).max(initial=0.0)
+            except (TypeError, ValueError, OverflowError) as error:
+                expected = "one time [s], or one for each person"
+                raise SolverError(
+                    f"stamps must be {expected}; got {stamps!r:.200}"
+                ) from error
             if late > memory:
                 faults.append(
                     f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s only"

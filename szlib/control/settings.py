@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
@@ -20,7 +19,13 @@ Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest"]
-_CHOICES = {"margin": Margin, "pass_side": Side, "solver": Solver, "terminal": Terminal}
+_CHOICES = {
+    "margin": Margin,
+    "pass_side": Side,
+    "solver": Solver,
+    "terminal": Terminal,
+    "guard": Literal[True, False],
+}
 _COUNTS = "N", "N_h", "max_iterations"
 # settings that may be infinite
 _LIMITS = "lookahead decay_price zone_price time_limit deadline"
@@ -158,10 +163,14 @@ class MPCSettings:
             value = getattr(self, name)
             allowed = get_args(choice)
             expected = " or ".join(map(repr, allowed))
-            require(value in allowed, name, value, expected, SolverError)
-        put("grid", grid := tuple(map(operator.index, self.grid)))
+            is_allowed = isinstance(value, str | bool) and value in allowed
+            require(is_allowed, name, value, expected, SolverError)
+        lengths = check_array("grid", self.grid or (), (...,)).ravel()
+        grid = tuple(lengths.astype(int).tolist())
+        put("grid", grid)
         if grid:
             is_grid = grid[0] == 1 == min(grid) and self.terminal == "none"
+            is_grid &= grid == tuple(lengths.tolist())
             expected = "whole numbers >= 1, the first 1, and no terminal condition"
             require(is_grid, "grid", grid, expected, SolverError)
             put("N", len(grid))
@@ -221,7 +230,11 @@ class MPCSettings:
         (14, 3.0)
         """
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
-        reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
+        dt, v_max = (
+            check_number(name, changes.get(name, getattr(cls, name)))
+            for name in ("dt", "v_max")
+        )
+        reach = sum(grid) * dt * v_max
         own: dict[str, Any] = {
             "gamma": 0.1,
             "grid": grid,

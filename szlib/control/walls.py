@@ -153,15 +153,15 @@ def walls_from_map(
         picture = Image.open(io.BytesIO(read_small(folder / entries["image"])))
         require(picture.mode in _PICTURES, "its mode", picture.mode, f"of {_PICTURES}")
         grey = np.asarray(picture.convert("RGB"), float).mean(axis=2)
+        p = (grey if entries["negate"] else 255 - grey) / 255
+        is_solid = (p >= free) if unknown else (p > occupied)
+        return walls_from_grid(is_solid[::-1], side, origin, simplify=simplify)
     # whatever YAML, Pillow and NumPy say of a bad file
     except Exception as fault:
         expected = "a YAML file of map_server, whole, with an opaque PGM or PNG picture"
         raise DataError(
             f"{printable(path)}: {what} cannot be read: {fault}; expected {expected}"
         ) from fault
-    p = (grey if entries["negate"] else 255 - grey) / 255
-    is_solid = (p >= free) if unknown else (p > occupied)
-    return walls_from_grid(is_solid[::-1], side, origin, simplify=simplify)
 
 
 def walls_from_grid(
@@ -197,9 +197,10 @@ def walls_from_grid(
     expected = "positive, and at least 0"
     require(side > 0 <= within, "resolution, simplify", given, expected, SolverError)
     x, y, yaw = check_vector("origin", origin, 3)
-    cells = np.asarray(occupied, bool)
-    expected = "of shape (rows, columns)"
-    require(cells.ndim == 2, "occupied", cells.shape, expected, SolverError)
+    cells = np.asarray(occupied)
+    expected = "truth values of shape (rows, columns), such as grid > 65"
+    is_grid = cells.ndim == 2 and cells.dtype == bool
+    require(is_grid, "occupied", occupied, expected, SolverError)
     edges = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (row, begin), end = (edges > 0).nonzero(), (edges < 0).nonzero()[1]
     outlines = shapely.union_all(shapely.box(begin, row, end, row + 1))

@@ -68,17 +68,18 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     array = np.array("rows of several lengths")
     with suppress(ValueError):
         array = np.asarray(value)
-    expected = f"numbers of shape {shape}".replace("Ellipsis", "...")
+    of = f"shape {shape}".replace("Ellipsis", "...")
+    expected = f"numbers of {of}"
     require(array.dtype.kind in "iuf", name, value, expected, SolverError)
     sizes = shape[1:] if ... in shape else shape
     n_free = array.ndim - len(sizes)
     if array.shape[n_free:] != sizes or (n_free and sizes == shape):
-        raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
+        raise SolverError(f"{name} must have {of}; got {array.shape}")
     array = array.astype(float)
     require(np.isfinite(array).all(), name, value, "finite", SolverError)
     if np.abs(array).max(initial=0.0) > LARGEST:
         raise SolverError(
-            f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin"
+            f"{name} must lie within +-{LARGEST:g}; got {array.tolist()!s:.200}; move the origin"
         )
     return array
 

@@ -61,7 +61,7 @@ class Run:
     people: Array
     predicted: Array
     residual: Array
-    status: NDArray[np.str_]
+    status: NDArray[np.generic]
     safe: NDArray[np.bool_]
     slack: Array
     solve_time: Array

@@ -75,10 +75,12 @@ def find(data: str | Path | Sequence[str | Path]) -> list[Path]:
     >>> [file.name for file in datasets.find("*.csv")]
     ['a.csv', 'b.csv']
     """
-    if isinstance(data, str) and data in DATA_SETS:
-        return _find_named(data)
     names = [data] if isinstance(data, str | Path) else list(data)
-    files = [file for name in names for file in _expand(name)]
+    files = [
+        file
+        for name in names
+        for file in (_find_named if name in DATA_SETS else _expand)(name)
+    ]
     if not files:
         raise DataError(
             f"no data was named; expected {_NAMED}, or paths of track files"
@@ -104,9 +106,9 @@ def label(data: str | Path | Sequence[str | Path]) -> str:
     return label(data[0]) + (f"-and-{len(data) - 1}-more" if len(data) > 1 else "")
 
 
-def _find_named(name: str) -> list[Path]:
+def _find_named(name: str | Path) -> list[Path]:
     """The files of a named data set, each with the right hash."""
-    data = DATA_SETS[name]
+    data = DATA_SETS[str(name)]
     folder = os.environ.get(DATA_DIR_VARIABLE)
     store = pooch.create(
         path=Path(folder or pooch.os_cache("szlib")) / name,

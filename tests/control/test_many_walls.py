@@ -108,6 +108,65 @@ def test_the_plan_is_that_with_everybody(
     assert max(sizes) < 40 < len(people)
 
 
+class Exhibit(szlib.control.Obstacle):
+    """A place around which a visitor is kept off far beyond what could be touched."""
+
+    kind = "exhibit"
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        px, py = numbers
+        return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - 3.0
+
+    @classmethod
+    def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        return cls.distance(x, y, t, *numbers) + 2.9
+
+    def margin(self, settings: szlib.MPCSettings) -> float:
+        return 2.0
+
+
+class Cart(szlib.control.Obstacle):
+    """A cart that drives, of the priority of a body."""
+
+    kind = "cart"
+    priority = szlib.control.Priority.BODY
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        px, py, vx, vy = numbers
+        return ((x - px - t * vx) ** 2 + (y - py - t * vy) ** 2) ** 0.5 - 0.5
+
+    @classmethod
+    def speeds(cls, numbers: Array) -> Array:
+        return np.hypot(numbers[:, 2], numbers[:, 3])
+
+
+def test_a_users_obstacle_among_many_is_kept_off_by_its_own_distance_and_margin() -> (
+    None
+):
+    far = [Exhibit(100.0 + i, 100.0) for i in range(40)]
+    fast = szlib.MPCSettings(gamma=0.3, a_max=3.0, time_limit=np.inf)
+    controller = szlib.MPCCBF(ZONE, obstacles=[Exhibit(10.0, 0.3), *far], settings=fast)
+    state = np.array([0.0, 0.0, 0.8, 0.0])
+    for _ in range(120):
+        step = controller.step(state, (20.0, 0.0))
+        assert step.feasible and step.h.min() >= 0
+        state = advance(state, step.control, 0.1)
+    assert state[0] > 3.5, "it came as near as it may"
+
+
+@pytest.mark.parametrize("n", [4, 40])
+def test_an_obstacle_that_comes_fast_is_met_though_many_others_are_near(n: int) -> None:
+    posts = [[(4.0 + 0.1 * i, -3.0), (4.0 + 0.1 * i, -3.05)] for i in range(n)]
+    quick = szlib.MPCSettings.among_people(gamma=0.9, a_max=3.0, time_limit=np.inf)
+    cart = Cart(5.8, 8.0, 0.0, -3.0)
+    controller = szlib.MPCCBF(ZONE, walls=posts, obstacles=[cart], settings=quick)
+    for _ in range(2):
+        step = controller.step((3.5, 0.0, 0.8, 0.0), (20.0, 0.0))
+    assert step.status == "optimal" and step.feasible
+
+
 @pytest.mark.parametrize("seed", (1, 2, 4, 5))
 def test_a_plan_that_leaves_its_guess_meets_the_walls_that_it_did_not_know(
     seed: int, monkeypatch: pytest.MonkeyPatch

@@ -453,8 +453,19 @@ def test_now_that_is_no_finite_number_is_refused(now):
 
 @pytest.mark.parametrize("stamps", ["x", {}, [[1.0], []], 10**400])
 def test_stamps_that_are_no_numbers_are_refused(stamps):
+    rows = [[0.0, 0.0, 0.0, 0.0]]
     with pytest.raises(szlib.SolverError, match="stamps must be"):
-        szlib.Tracker().see([[0.0, 0.0, 0.0, 0.0]], now=0.0, stamps=stamps)
+        szlib.Tracker().see(rows, now=0.0, stamps=stamps)
+    controller = szlib.MPCCBF(ZONE)
+    with pytest.raises(szlib.SolverError, match="stamps must be"):
+        controller.step((0, 0, 0, 0), GOAL, rows, now=0.0, stamps=stamps)
+
+
+def test_masked_numbers_of_a_measurement_are_missing():
+    rows = np.ma.array([[1.0, 1.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0]])
+    rows[0, 0] = np.ma.masked
+    seen = szlib.Tracker().see(rows, now=0.0)
+    assert (seen.rejected, seen.unknown, len(seen.people)) == (1, 1, 1)
 
 
 @pytest.mark.parametrize(

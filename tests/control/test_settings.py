@@ -21,7 +21,7 @@ import szlib
         {"R": (0, 1)}, {"N_h": 2.5}, {"a_max": -1}, {"v_max": np.inf}, {"r_robot": -0.1}, {"eps": -1},
         {"zone_speed": 0}, {"head_on_share": 0.6}, {"head_on_share": -0.1}, {"a_max": 0}, {"pass_side": "up"},
         {"solver": "osqp"}, {"R": (-1, 1)},
-        {"terminal": "wall"},
+        {"terminal": "wall"}, {"grid": (1.0, 1.5)}, {"grid": "abc"}, {"guard": "no"}, {"solver": ["sqp"]},
         {"terminal": "person"}, {"decay_price": 0.0}, {"decay_price": np.nan}, {"decay_price": "high"},
         {"body_gap": -0.1}, {"jerk_weight": -1.0}, {"lookahead": 0.0}, {"lookahead": "4"},
         {"deadline": 0}, {"grid": (2, 1)}, {"grid": (1, 0)}, {"grid": (1, 2), "terminal": "rest"},

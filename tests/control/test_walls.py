@@ -130,6 +130,7 @@ BAD = {
     "threshold": ("free_thresh must be", {"occupied_thresh": 65}),
     "negate": ("negate must be 0 or 1", {"negate": 2}),
     "mode": ("mode must be 'trinary'", {"mode": "trinity"}),
+    "far away": ("must lie within", {"origin": [1e8, 0.0, 0.0]}),
 }
 
 
@@ -174,11 +175,13 @@ def test_a_file_that_is_no_map_is_an_error(tmp_path: Path) -> None:
 
 def test_a_bad_grid_is_an_error() -> None:
     for arguments in (
-        (np.zeros(4), 0.05),
-        (np.zeros((4, 4)), 0.0),
-        (np.zeros((4, 4)), 0.05, (0.0, 0.0)),
+        (np.zeros(4, bool), 0.05),
+        (np.zeros((4, 4), bool), 0.0),
+        (np.zeros((4, 4), bool), 0.05, (0.0, 0.0)),
+        (np.full((4, 4), -1), 0.05),  # unknown, in a grid of ROS
+        (np.full((4, 4), np.nan), 0.05),
     ):
-        with pytest.raises(szlib.SolverError):
+        with pytest.raises(szlib.SolverError, match=r"must be|must have"):
             walls_from_grid(*arguments)
 
 
@@ -313,7 +316,7 @@ def test_a_room_is_no_solid() -> None:
 
 
 def test_segments_enclose_no_solid() -> None:
-    assert find_solids(walls_from_grid(np.ones((4, 4)), 1.0)) is None
+    assert find_solids(walls_from_grid(np.ones((4, 4), bool), 1.0)) is None
     assert find_solids([]) is None
 
 

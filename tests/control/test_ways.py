@@ -20,6 +20,7 @@ from szlib.control.ways import (
     GROUP_DISTANCE,
     GROUP_SECOND,
     GROUP_SPEED,
+    MOST_CELLS,
     SWITCH_GAIN,
     ZONE_SECOND,
     Map,
@@ -315,6 +316,30 @@ def test_a_goal_far_away_is_headed_for(goal) -> None:
     steps = drive(szlib.MPCCBF(ZONE, settings=AHEAD), goal, 15, start=(0, 0, 0, 0))
     assert np.hypot(*steps[-1].predicted[0, :2]) > 0.5
     assert (steps[-1].predicted[0, :2] * np.sign(goal) > 0).all()
+
+
+@pytest.mark.parametrize("away", [1e3, 1e5, 1e8])
+def test_a_map_of_any_size_has_no_more_cells_than_it_may(away: float) -> None:
+    points = np.array([(0.0, 0.0), (away, 0.0)])
+    free = Map(Obstacles((), 0.5), points).free
+    assert 0.5 * MOST_CELLS < free.size <= 1.2 * MOST_CELLS
+
+
+def test_a_route_of_any_length_is_followed() -> None:
+    walls = [[(-3, -3), (3, -3), (3, 3), (-3, 3), (-3, -3)]]
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG)
+    for far in (1e2, 1e4, 1e8):
+        step = controller.step((0, 0, 0, 0), (2, 0), route=[(1, 0), (far, 0), (2, 0)])
+        assert 1.0 <= step.target[0] < 3.0 and step.way_length == pytest.approx(
+            2 * far - 2, rel=1e-3
+        )
+
+
+def test_people_at_one_place_are_no_pairs_to_pass_between() -> None:
+    """Of 200 there would be 19,900, each with prices of its own."""
+    people = [[2.0, 0.0, 0.0, 0.0]] * 200
+    step = szlib.MPCCBF(ZONE, settings=AMONG).step((0, 0, 0, 0), (4, 0), people)
+    assert step.status in szlib.control.STATUSES and len(step.h) == 200
 
 
 def test_a_door_of_a_large_building_stays_open() -> None:
