@@ -30,7 +30,7 @@ from ..core.input_files import file_content, printable
 from ..encounters import days as several_days
 from ..tracks import datasets
 from ..zones.outliers import R_MAX
-from ..zones.social_zone import FORMAT
+from ..zones.social_zone import FORMAT, check_method
 from ..zones.uncertainty import N_RESAMPLES
 from ..zones.verdict import describe_missing_encounters
 from .folders import read_json_object, require_place
@@ -76,6 +76,8 @@ def fit(
     from matplotlib.figure import Figure
 
     file = _require_place(Path(out))
+    if method is not None:
+        check_method(method)
     if any(folder_purpose(path) == several_days.PURPOSE for path in paths):
         samples, table, settings = _read_days(paths, tracks, exclude)
         zone = _fit_lone_encounters(samples, table, settings, method, kind)

@@ -122,7 +122,7 @@ class SocialZone:
     null_test: NullTest | None = None
 
     def __post_init__(self) -> None:
-        _check_method(self.method)
+        check_method(self.method)
         if (self.method in ("hull", "paper")) != isinstance(self.shape, HullZone):
             raise ZoneError(
                 f"a {type(self.shape).__name__} is not the shape of a zone of method {self.method!r}"
@@ -257,7 +257,7 @@ class SocialZone:
         >>> zone.method, list(zone.ellipses)
         ('paper', [1.1])
         """
-        _check_method(method or "paper", options)
+        check_method(method or "paper", options)
         check_columns(samples, ["los_angle", "distance", "speed"])
         fitted_speeds = sorted({float(speed) for speed in speeds})
         if not fitted_speeds:
@@ -525,8 +525,14 @@ def recorded_hours(samples: pd.DataFrame) -> float | None:
     return float(samples["t"].groupby(days, observed=True).agg(np.ptp).sum() / 3600)
 
 
-def _check_method(method: str, options: Iterable[str] = ()) -> None:
-    """Raise ZoneError if the method is unknown, or does not have one of the options."""
+def check_method(method: str, options: Iterable[str] = ()) -> None:
+    """Raise ZoneError if the method is unknown, or does not have one of the options.
+
+    Parameters
+    ----------
+    method : name of a method, one of `METHODS`.
+    options : names of its options.
+    """
     require(
         method in METHODS, "method", method, f"one of {', '.join(METHODS)}", ZoneError
     )
