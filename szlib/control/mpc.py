@@ -77,7 +77,7 @@ from .people import (
     as_ellipse,
     list_knots,
 )
-from .planner import FEW, Plan, Planner, find_reach_time
+from .planner import Plan, Planner
 from .problem import (
     Question,
     build_horizon,
@@ -188,14 +188,8 @@ class MPCCBF(Controller):
         self._fixed = Obstacles.of(items, self._s)
         self._fixed_of_disc = Obstacles.of(items, self.settings)
         self._ways = WayFinder(self._fixed, self._s)
-        self._take_near(np.zeros(len(items)), (inf, inf))
-
-    def _take_near(self, ways: Array, at: Point) -> None:
-        """Take what has a way <= 0 as near the robot, and what of this it can always stop before."""
-        self._near = self._fixed.chosen(ways)
-        self._near_from = at
-        self._walls_near = self._fixed_of_disc.chosen(ways).walls
-        self._room: tuple[Point, float] = at, -inf
+        self._walls = self._fixed_of_disc.walls
+        self._room: tuple[Point, float] = (inf, inf), -inf
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
@@ -228,7 +222,6 @@ class MPCCBF(Controller):
         self._clock = StepClock(self._s.dt)
         self.tracker.reset()
         self._planner.reset()
-        self._near_from = inf, inf
         self._ways = WayFinder(self._fixed, self._s)
 
     def step(
@@ -269,7 +262,6 @@ class MPCCBF(Controller):
         age = check_number("state_age", state_age)
         x, towards = self._locate(state, check_point("goal", goal), age)
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
-        self._find_near(*x)
         scene = self._make_scene(x, towards, tracked, is_point=True)
         heading = self._choose_heading(scene, route)
         remaining = heading.length if heading.length < inf else dist(x[:2], towards)
@@ -333,7 +325,7 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        barriers = scene.zones.joined(self._near)
+        barriers = scene.zones.joined(self._fixed)
         question = Question(state, heading.target, last, barriers)
         guess = self._plan + self._change
         if s.solver == "ipopt":
@@ -370,7 +362,7 @@ class MPCCBF(Controller):
             return False, (True, True)
         bodies = find_bodies(scene.zones, self.settings)
         path = self._carry(find_stopping_path(state, control, s))
-        wall = Bound() if is_wall_far else self._walls_near.bound(path)
+        wall = Bound() if is_wall_far else self._walls.bound(path)
         body = Bound() if is_body_far else self._bound_bodies(bodies, path)
         walls_safe = wall.is_safe
         is_safe = body.is_safe
@@ -381,7 +373,7 @@ class MPCCBF(Controller):
             return False, (walls_safe, walls_safe and is_safe)
         braking = plan_braking(s, state[2:])[0]
         path = self._carry(find_stopping_path(state, braking, s))
-        rest = self._walls_near.bound(path), self._bound_bodies(bodies, path)
+        rest = self._walls.bound(path), self._bound_bodies(bodies, path)
         before, after = (body, rest[1]) if walls_safe else (wall, rest[0])
         if after.seen < min(-TOLERANCE, before.seen):
             return False, (walls_safe, False)
@@ -409,7 +401,7 @@ class MPCCBF(Controller):
         )
         at, room = self._room
         if room - dist(at, (x, y)) < reach:
-            room = float(self._walls_near.gaps(x, y).min(initial=inf))
+            room = float(self._walls.gaps(x, y).min(initial=inf))
             self._room = at, room = (x, y), room
         return room - dist(at, (x, y)) >= reach, is_body_far
 
@@ -434,25 +426,13 @@ class MPCCBF(Controller):
         if np.hypot(*np.ptp(path.points, axis=0)) <= AT_REST * self._s.dt:
             return Bound()
         overlaps = bodies.gaps(*begin) < -TOLERANCE
-        bound = bodies.chosen(overlaps).bound(path)
+        bound = bodies.select_near(np.where(overlaps, inf, 0.0)).bound(path)
         if overlaps.any():
             places = bodies.groups[0].numbers[overlaps, :2]
             towards = float(((places - begin) @ (path.points - begin).T).max())
             if towards > 0:
                 bound = Bound(min(bound.lower, -towards), min(bound.seen, -towards))
         return bound
-
-    def _find_near(self, x: float, y: float, vx: float, vy: float) -> None:
-        """Take what can matter within the horizon among everything fixed; looked for once a metre."""
-        s = self._s
-        speed = hypot(vx, vy)
-        is_near = dist((x, y), self._near_from) <= 1.0 and speed <= s.v_max
-        if self._fixed.size <= FEW or is_near:
-            return
-        speed = max(s.v_max, speed)
-        time = max(s.times[-1] + find_reach_time(s), 2 * s.dt + speed / s.a_max)
-        (ways,) = self._fixed.find_ways(np.array([x]), np.array([y])).T
-        self._take_near(ways - (speed + self._fixed.speeds) * time - 1.0, (x, y))
 
     def _make_scene(
         self,
@@ -504,7 +484,7 @@ class MPCCBF(Controller):
             target = x + vx * time / 2, y + vy * time / 2
         elif scene.people and not (heading and heading.ways):
             zones = scene.zones.groups[0].numbers.tolist()
-            fixed = self._near
+            fixed = self._fixed
             target = find_target(at, target, zones, fixed, s)
         if heading:
             return heading._replace(target=target)

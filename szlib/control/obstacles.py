@@ -265,14 +265,8 @@ class Obstacle:
         return cls.distance(x, y, t, *numbers)
 
     @staticmethod
-    def way(distance: Any, *numbers: Any) -> Any:
-        """How far a robot at this `distance` must move at least to reach the obstacle [m]; by default so far.
-
-        Parameters
-        ----------
-        distance : by `Obstacle.distance` [m].
-        numbers : of the obstacle.
-        """
+    def _travel(distance: Any, *numbers: Any) -> Any:
+        """How far a robot at this `distance` must move at least to reach the obstacle [m]."""
         return distance
 
     @classmethod
@@ -420,11 +414,8 @@ class Wall(Obstacle):
         return segment_formula(x, y, *numbers)
 
     @staticmethod
-    def way(distance: Any, *numbers: Any) -> Any:
-        """See `Obstacle.way`; `distance` and `numbers` as there.
-
-        The way s, with d = s + s^2/L, changes by no more than the robot moves: see `differential_drive`.
-        """
+    def _travel(distance: Any, *numbers: Any) -> Any:
+        """The s of d = s + s^2/L: it changes by no more than the robot moves (`differential_drive`)."""
         xa, ya, xb, yb = numbers
         length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
         return length / 2 * ((1 + 4 * distance / length) ** 0.5 - 1)
@@ -574,19 +565,19 @@ class Obstacles(NamedTuple):
         """These, and then the `others`."""
         return Obstacles(self.groups + others.groups, self.r_robot)
 
-    def chosen(self, ways: NDArray[Any], at_once: int = 1) -> Obstacles:
-        """Those with a way <= 0, and the nearest others of each group until `at_once` divides their number.
+    def select_near(self, distances: NDArray[Any], multiple: int = 1) -> Obstacles:
+        """Those at a distance <= 0, and the next nearest of each kind until their number is a `multiple`.
 
         Parameters
         ----------
-        ways : to each, or as an order, shape (n,) [m].
-        at_once : of which the number in each group is a multiple, as far as there are so many.
+        distances : of all, shape (n,) [m].
+        multiple : of which the number of each kind is a multiple, or else that of all of this kind.
         """
         groups = list[Group]()
-        rest: Any = ways
+        rest: Any = distances
         for kind, numbers, offsets in self.groups:
             own, rest = np.split(rest, [len(offsets)])
-            n = -(-np.count_nonzero(own <= 0) // at_once) * at_once
+            n = -(-np.count_nonzero(own <= 0) // multiple) * multiple
             rows = np.sort(np.argsort(own)[:n])
             if n:
                 groups.append(Group(kind, numbers[rows], offsets[rows]))
@@ -635,6 +626,8 @@ class Obstacles(NamedTuple):
     def bound(self, path: Path, *, is_barrier: bool = False) -> Bound:
         """Lower bound of the gaps on a path, and the least gap at its points but the first.
 
+        Of the obstacles that it may reach; inf if there are none.
+
         Parameters
         ----------
         path : of the robot.
@@ -647,7 +640,12 @@ class Obstacles(NamedTuple):
         and the obstacle move, so it is nowhere less than half of the sum of both ends less that way. The
         robot leaves a uniform motion by at most the bow.
         """
-        if not self.groups:
+        length = np.hypot(*np.diff(path.points, axis=0).T).sum() + path.bows.sum()
+        reach = length + self.speeds * (path.times[-1] - path.times[0])
+        at_first = path.points[0, 0], path.points[0, 1], path.times[0]
+        first = self.h(*at_first) if is_barrier else self.gaps(*at_first)
+        near = self.select_near(first - reach)
+        if not near.groups:
             return Bound()
         n = len(path.bows)
         parts = np.linspace(0.0, n, n * _PARTS + 1)
@@ -655,20 +653,21 @@ class Obstacles(NamedTuple):
             np.interp(parts, np.arange(n + 1), each)
             for each in (*path.points.T, path.times)
         )
-        gaps = (self.h if is_barrier else self.gaps)(x, y, t)
-        moved = self.speeds[:, None] * np.diff(t)
+        gaps = (near.h if is_barrier else near.gaps)(x, y, t)
+        moved = near.speeds[:, None] * np.diff(t)
         reach = np.hypot(np.diff(x), np.diff(y)) + moved
         bows = np.repeat(path.bows, _PARTS)
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
         return Bound(lower.min(), gaps[:, _PARTS::_PARTS].min())
 
-    def find_ways(self, x: Array, y: Array, t: Any = 0.0) -> Array:
-        """How far a robot must move at least until h of each obstacle is 0, shape (n, k) [m].
+    def find_travel(self, x: Array, y: Array, t: Any, body_gap: float) -> Array:
+        """How far a robot must move at least until it violates a floor of each obstacle, shape (n, k) [m].
 
-        An obstacle with the velocity w can be left out of a step of dt that begins where this way is at least
-        2 (v + w) dt/gamma: then its rows hold whatever a robot does that is no faster than v. This is clear
-        where the way is h. It is not for a wall of length L: there d = F(s) = s + s^2/L, where s is the way
-        to the wall. With S the way to the wall where h = 0,
+        That is until h = 0, or until it is `body_gap` from the body of a person. An obstacle with the
+        velocity w can be left out of a step of dt that begins where this is at least 2 (v + w) dt/gamma: then
+        its rows hold whatever a robot does that is no faster than v. This is clear where h changes by no more
+        than the robot moves. For a wall of length L, d = F(s) = s + s^2/L, where s is how far the robot must
+        move to the wall. With S the same where h = 0,
 
             gamma h(x_k) = gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
                          >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
@@ -678,13 +677,18 @@ class Obstacles(NamedTuple):
         Parameters
         ----------
         x, y : positions, shape (k,) [m].
-        t : their times from now [s].
+        t : their times from now, shape (k,) [s].
+        body_gap : gap that the robot keeps to bodies [m].
         """
         found = [np.empty((0, len(x)))]
         for kind, numbers, offsets in self.groups:
             table = numbers.T[..., None]
-            ways = kind.way(kind.distance(x, y, t, *table), *table)
-            found.append(ways - kind.way(offsets, *numbers.T)[:, None])
+            own = kind._travel(kind.distance(x, y, t, *table), *table)
+            own = own - kind._travel(offsets, *numbers.T)[:, None]
+            if kind.priority > Priority.BODY:
+                gaps = kind.gap(x, y, t, *table) - self.r_robot
+                own = np.minimum(own, gaps - body_gap)
+            found.append(own)
         return np.concatenate(found)
 
     def _collect(

@@ -55,9 +55,13 @@ CONVERGED = 1e-3
 HARD_PRICE = 1e5
 # Rows with a larger value are left out of an iteration [m]; smaller where the plan cannot change so much.
 NEAR = 1.0
-FEW = 24  # up to so many obstacles are all in a problem, of more those that are near
-_SPARE = 0.5  # by which a problem at first looks farther than what can matter [m]
-_AT_ONCE = 16  # the numbers of walls and people are multiples of it, so that few problems are built
+_MOST_UNFILTERED = 24  # with at most so many obstacles, a problem contains all of them
+_FIRST_MARGIN = (
+    0.5  # a problem contains what is so much farther than what can matter [m]
+)
+_MULTIPLE = (
+    16  # and this number of zones and walls, or a multiple: few sizes of problems
+)
 _FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
 _EVERY = slice(None)
 _MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
@@ -254,10 +258,10 @@ class Program(LinearProblem):
         return float(self.cost[0] + np.maximum(self.lower, 0.0) @ self.prices)
 
 
-def find_reach_time(s: MPCSettings) -> float:
-    """Time in which a robot must reach h = 0 of an obstacle, so that its rows can be violated now [s].
+def _find_reach_time(s: MPCSettings) -> float:
+    """Time to h = 0 at constant speed from which on no step of a plan can violate a row [s].
 
-    See `Obstacles.find_ways`; with the settings `s`.
+    See `Obstacles.find_travel`; with the settings `s`.
     """
     longest = max(s.step_lengths)
     gamma = min(s.gamma, s.a_max * s.dt / s.v_max)
@@ -293,31 +297,33 @@ class Planner:
     def plan(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, from a `guess`, shape (N, 2) [m/s2].
 
-        Of many obstacles, only those near the guess are in the problem. If the plan comes near others, they
-        join, and it is made again from there.
+        Of many obstacles, the problem contains those near the guess. If the plan comes near others, it is
+        made again with them, from there.
         """
         barriers = question.barriers
-        if barriers.size <= FEW:
+        if barriers.size <= _MOST_UNFILTERED:
             return self._plan_among(question, guess)
-        ways = self._find_ways(question, guess) - _SPARE
+        spare = self._find_spare(question, guess) - _FIRST_MARGIN
         while True:
-            some = question._replace(barriers=barriers.chosen(ways, _AT_ONCE))
-            plan = self._plan_among(some, guess)
-            after = self._find_ways(question, plan.inputs)
-            if plan.timed_out or not ((after <= 0.0) & (ways > 0.0)).any():
+            near = barriers.select_near(spare, _MULTIPLE)
+            plan = self._plan_among(question._replace(barriers=near), guess)
+            after = self._find_spare(question, plan.inputs)
+            if not ((after <= 0.0) & (spare > 0.0)).any():
                 return plan
-            ways = np.minimum(ways, after)
+            if plan.timed_out:
+                return plan._replace(is_relaxed=True)
+            spare = np.minimum(spare, after)
             guess = plan.inputs
 
-    def _find_ways(self, question: Question, inputs: Array) -> Array:
-        """How far a plan is from where each obstacle can matter, shape (n,) [m]; at most 0 where it can."""
+    def _find_spare(self, question: Question, inputs: Array) -> Array:
+        """By how much each obstacle is farther from a plan than what can matter, shape (n,) [m]."""
         s = self.settings
+        barriers = question.barriers
         states = build_horizon(s).states(np.array(question.state), inputs)
-        x, y = states[:, :2].T
-        ways = question.barriers.find_ways(x, y, np.array(s.times)).min(axis=1)
+        at = *states[:, :2].T, np.array(s.times)
         speed = np.hypot(*states[:, 2:].T).max()
-        reach = (speed + question.barriers.speeds) * find_reach_time(s)
-        return np.asarray(ways - reach)
+        reach = (speed + barriers.speeds) * _find_reach_time(s)
+        return np.asarray(barriers.find_travel(*at, s.body_gap).min(axis=1) - reach)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, with all its obstacles.

@@ -163,11 +163,12 @@ class MPCSettings:
             value = getattr(self, name)
             allowed = get_args(choice)
             expected = " or ".join(map(repr, allowed))
-            is_allowed = isinstance(value, str | bool) and value in allowed
+            is_allowed = isinstance(value, str | bool | np.bool_) and value in allowed
             require(is_allowed, name, value, expected, SolverError)
-        lengths = check_array("grid", self.grid or (), (...,)).ravel()
+        lengths = check_array("grid", self.grid, (np.size(self.grid),))
         grid = tuple(lengths.astype(int).tolist())
         put("grid", grid)
+        put("guard", bool(self.guard))
         if grid:
             is_grid = grid[0] == 1 == min(grid) and self.terminal == "none"
             is_grid &= grid == tuple(lengths.tolist())

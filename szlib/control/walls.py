@@ -114,6 +114,7 @@ def walls_from_map(
     Raises
     ------
     DataError : a file cannot be read, or an entry is missing or out of its range; the message names both.
+    SolverError : `simplify` is no number >= 0.
 
     Notes
     -----
@@ -133,6 +134,8 @@ def walls_from_map(
     ([4.0, 0.0], [10.0, 2.0])
     >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), walls=walls)
     """
+    within = check_number("simplify", simplify)
+    require(within >= 0, "simplify", within, "at least 0", SolverError)
     what = "the map"
     folder = Path(path).parent
     try:
@@ -155,7 +158,7 @@ def walls_from_map(
         grey = np.asarray(picture.convert("RGB"), float).mean(axis=2)
         p = (grey if entries["negate"] else 255 - grey) / 255
         is_solid = (p >= free) if unknown else (p > occupied)
-        return walls_from_grid(is_solid[::-1], side, origin, simplify=simplify)
+        return walls_from_grid(is_solid[::-1], side, origin, simplify=within)
     # whatever YAML, Pillow and NumPy say of a bad file
     except Exception as fault:
         expected = "a YAML file of map_server, whole, with an opaque PGM or PNG picture"

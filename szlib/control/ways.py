@@ -42,7 +42,7 @@ Cells = NDArray[np.intp]
 CELL = 0.15
 """Side of a cell [m] (assumed)."""
 MOST_CELLS = 250_000
-"""Number of cells of a map; those of a larger one are larger (assumed)."""
+"""About the greatest number of cells of a map; those of a large one are larger (assumed)."""
 SEARCH_RADIUS = 4.0
 SEARCH_TIME = 6.0
 """How far the search looks, from the robot [m], and in time [s] (assumed)."""

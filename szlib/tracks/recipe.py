@@ -253,7 +253,9 @@ def find_recipe(
         for path in filter(Path.is_file, saved):
             recipe = Recipe.load(path)
             how = arguments(recipe.as_json())
-            warn(f"read by {path}: {how:.120}; delete it to read files otherwise")
+            warn(
+                f"the settings in {path} are used: {how:.120} ...; delete it if they are wrong"
+            )
     given = {name: value for name, value in parameters.items() if value is not None}
     return Recipe(**given).over(recipe)
 

@@ -319,3 +319,19 @@ def test_a_stopping_path_is_passed_at_its_times(a_max):
     expected = np.column_stack([t - a_max * t**2 / 2, 0 * t])
     assert path.points == pytest.approx(expected, abs=path.bows.max())
     assert path.points[:-1] == pytest.approx(expected[:-1], abs=1e-9)
+
+
+def test_a_post_is_seen_by_the_guard_though_the_paper_hardly_sees_it() -> None:
+    """With the paper's margin a short wall has h > 0 where the robot touches it; the guard takes the gap."""
+    settings = szlib.MPCSettings(
+        margin="paper", v_max=0.1, gamma=0.5, N=2, R=(300.0, 300.0), time_limit=np.inf
+    )
+    post = [[(2.0, -7.5e-4), (2.0, 7.5e-4)]]
+    far = [[(30.0 + i, 30.0), (30.0 + i, 31.0)] for i in range(40)]
+    controller = szlib.MPCCBF(ZONE, walls=post + far, settings=settings)
+    state = np.array([0.85, 0.0, 0.0, 0.0])
+    for _ in range(250):
+        step = controller.step(state, (1.83, 0.0))
+        assert step.walls_safe and step.verify().ok, step.verify().faults
+        state = advance(state, step.control, 0.1)
+    assert state[0] > 1.4, "it comes near the post"

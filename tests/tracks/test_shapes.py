@@ -227,7 +227,9 @@ def test_a_shape_is_read_by_what_its_error_proposes_and_saved(
 
 def says_recipe() -> Any:
     """A warning that names the file which says how others are read."""
-    return pytest.warns(szlib.DataWarning, match=rf"read by .*{FILE_NAME}: --")
+    return pytest.warns(
+        szlib.DataWarning, match=rf"the settings in .*{FILE_NAME} are used: --"
+    )
 
 
 def test_a_recipe_is_taken_from_beside_the_data_unless_one_is_given(
