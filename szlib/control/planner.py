@@ -320,10 +320,11 @@ class Planner:
         s = self.settings
         barriers = question.barriers
         states = build_horizon(s).states(np.array(question.state), inputs)
-        at = *states[:, :2].T, np.array(s.times)
+        x, y = states[:, :2].T
         speed = np.hypot(*states[:, 2:].T).max()
         reach = (speed + barriers.speeds) * _find_reach_time(s)
-        return np.asarray(barriers.find_travel(*at, s.body_gap).min(axis=1) - reach)
+        travel = barriers.find_travel(x, y, np.array(s.times), s.body_gap)
+        return np.asarray(travel.min(axis=1) - reach)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, with all its obstacles.

@@ -9,8 +9,9 @@ import pytest
 from studies.distances import euclidean_to_segment
 
 import szlib
-from szlib.control import HalfPlane, Obstacles, Wall, advance, planner
-from szlib.control.problem import follow_velocities
+from szlib.control import HalfPlane, Obstacles, Wall, Zone, advance, planner
+from szlib.control.obstacles import find_bodies
+from szlib.control.problem import build_horizon, follow_velocities
 from szlib.core.checks import Array
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
@@ -160,31 +161,41 @@ def test_an_obstacle_that_comes_fast_is_met_though_many_others_are_near(n: int) 
     assert step.status == "optimal" and step.feasible
 
 
-@pytest.mark.parametrize("change", [{"body_gap": 1.0}, {"body_gap": 1.5, "v_max": 0.4}])
-def test_a_gap_to_bodies_that_reaches_beyond_the_zone_is_kept_in_a_crowd(
-    change: Any,
-) -> None:
-    """Forty people far away change no plan, though the zone of the near one is too far away to matter."""
-    zone = szlib.Ellipse((0.1, 0.0), (0.3, 0.25))
-    settings = szlib.MPCSettings.among_people(time_limit=np.inf, **change)
-    few, many = (szlib.MPCCBF(zone, settings=settings) for _ in range(2))
-    far = [szlib.Person((50.0 + i, 50.0)) for i in range(40)]
-    near, state = szlib.Person((4.0, 0.2)), np.zeros(4)
-    for _ in range(100):
-        step = few.step(state, (8.0, 0.0), [near])
-        again = many.step(state, (8.0, 0.0), [near, *far])
-        assert again.inputs == pytest.approx(step.inputs, abs=1e-4)
-        state = advance(state, step.control, 0.1)
-    assert state[0] > 2.0
+def test_what_is_left_out_keeps_its_zone_and_its_body_whatever_the_plan() -> None:
+    """Bodies as well, where the gap to them reaches beyond the zone."""
+    s = szlib.MPCSettings.among_people(body_gap=1.5, v_max=0.4)
+    rng, n_left_out = np.random.default_rng(4), 0
+    small = szlib.Ellipse((0.1, 0.0), (0.3, 0.25))
+    times = np.array(s.times)
+    for _ in range(60):
+        x, y, vx, vy = rng.uniform(-4, 4, (4, 30)) * [[1.0], [1.0], [0.1], [0.1]]
+        rows = [
+            Zone(*Zone.place(small, each[:2], 0.0, each[2:]))
+            for each in zip(x, y, vx, vy, strict=True)
+        ]
+        zones = Obstacles.of(rows, s)
+        state = (0.0, 0.0, *rng.uniform(-0.4, 0.4, 2))
+        question = planner.Question(state, GOAL, (0.0, 0.0), zones)
+        inputs = follow_velocities(s, state[2:], rng.uniform(-0.4, 0.4, (s.N, 2)))
+        left_out = planner.Planner(s)._find_spare(question, inputs) > 0
+        at = build_horizon(s).states(np.array(state), inputs)[:, :2].T
+        h = zones.h(*at, times)
+        keep = (1 - s.gamma) ** np.array(s.step_lengths)
+        bodies = find_bodies(zones, s, as_predicted=True).h(*at, times)
+        assert (h[left_out, 1:] >= keep * h[left_out, :-1]).all()
+        assert (h[left_out] >= 0).all() and (bodies[left_out] >= 0).all()
+        n_left_out += left_out.sum()
+    assert n_left_out > 100
 
 
 def test_a_plan_that_is_cut_short_before_all_its_obstacles_are_known_is_not_optimal() -> (
     None
 ):
-    hasty = szlib.MPCSettings(time_limit=1e-9, deadline=1e-9)
-    for seed in range(8):
+    hasty = szlib.MPCSettings.among_people(time_limit=1e-9, deadline=1e-9)
+    for seed in range(4):
         walls = scattered(200, seed, size=16.0)
-        step = szlib.MPCCBF(ZONE, walls=walls, settings=hasty).step((0, 0, 1, 0), GOAL)
+        controller = szlib.MPCCBF(ZONE, walls=walls, settings=hasty)
+        step = controller.step((0.0, 0.0, 1.0, 0.0), GOAL)
         assert step.timed_out and (step.feasible or step.status != "optimal")
 
 
