@@ -124,5 +124,6 @@ def draw_outcomes(outcomes: pd.DataFrame) -> Figure:
 
 if __name__ == "__main__":
     everything = pd.concat([meet(name, REFERENCE, int(sys.argv[1])) for name in METHODS])
-    write_table(summarise(everything, BY, METRICS), "26_meetings")
-    write_table(summarise(everything, BY, METRICS, against=RIVAL), "26_meetings_paired")
+    write_table(summarise(everything, BY, METRICS).round(9), "26_meetings")
+    paired = summarise(everything, BY, METRICS, against=RIVAL)
+    write_table(paired.round(9), "26_meetings_paired")
