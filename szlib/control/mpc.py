@@ -107,7 +107,7 @@ class MPCCBF(Controller):
         a `SocialZone`, whose zone at `settings.zone_speed` is used.
     walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. Inside of
         a polygon no step is safe. The attribute `walls` holds the segments.
-    obstacles : what else stands still: `HalfPlane`s, or an `Obstacle` of your own; an attribute as well.
+    obstacles : what else stands still: each a `HalfPlane` or an `Obstacle` of your own; an attribute as well.
     settings : every other parameter.
     tracker : remembers people by their ids; default: `Tracker()`.
 
@@ -242,9 +242,9 @@ class MPCCBF(Controller):
         ----------
         state : (x, y, vx, vy) [m, m/s]; for a `DifferentialDrive` see there.
         goal : (x, y) [m].
-        people : everybody to be respected: `Person`s, or an array, shape (n, 4): x, y [m], vx, vy [m/s].
-        ids : by which the tracker recognises them, None for a person without an id; default: those of the
-            `Person`s. See `Tracker`.
+        people : all to be respected: each a `Person`; or an array, shape (n, 4): x, y [m], vx, vy [m/s].
+        ids : by which the tracker recognises them, None for a person without an id; default: that of each
+            `Person`. See `Tracker`.
         stamps : when they were measured, one time for each or one for all [s]; default: now.
         now : time, by the same clock [s]; default: `dt` after the last step.
         route : a way to the goal from a global planner, corners, shape (m, 2) [m]; default: a way of its own

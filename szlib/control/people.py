@@ -160,7 +160,7 @@ SPREAD = 1.64
 def predict(
     people: ArrayLike, times: ArrayLike, positions: Any, spread: Any = 0.0
 ) -> list[Person]:
-    """`Person`s with the predictions of all of them.
+    """A list with a `Person` for each row, who has a prediction.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ SAME_PLACE = 0.5
 """Distance from where a lost person is expected up to which a new id means the same person [m] (assumed)."""
 _LastSeen = tuple[Person, float]  # a person as last seen, and when [s]
 People = Sequence[Person] | ArrayLike
-"""People as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
+"""People: each a `Person`; or an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
 
 
 class TrackedPeople(NamedTuple):
@@ -355,10 +355,10 @@ class Tracker:
 
         Parameters
         ----------
-        people : `Person`s, or an array, shape (n, 4): x, y [m], vx, vy [m/s]. A heading that a `Person` was
-            given is used.
+        people : each a `Person`; or an array, shape (n, 4): x, y [m], vx, vy [m/s]. A heading that a
+            `Person` was given is used.
         now : time, of any clock [s].
-        ids : one for each of them, None for a person without an id; default: those of the `Person`s.
+        ids : one for each of them, None for a person without an id; default: that of each `Person`.
         stamps : when they were measured, one time for each or one for all [s]; default: now.
 
         Raises

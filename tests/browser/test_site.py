@@ -31,11 +31,13 @@ def folder(tmp_path_factory):
         str(folder / "html" / ".doctrees"),
         ".docs/pages",
     ]
-    subprocess.run(
+    built = subprocess.run(
         [sys.executable, "-m", "sphinx", *options, str(folder / "html")],
         cwd=ROOT, env=os.environ | {"SZLIB_DOCS_NOTEBOOKS": "07*", "SZLIB_REPOSITORY": "me/szlib"},
         capture_output=True, text=True, check=True,
     )  # fmt: skip
+    faults = re.findall(r".*(?:WARNING|ERROR): .*\[docutils\]", built.stderr)
+    assert not faults, "a docstring is no reStructuredText"
     return folder / "html"
 
 
