@@ -414,13 +414,17 @@ recording
 # %%
 recording.open_live()
 
+
 # %% jupyter={"source_hidden": true}
 # The answer
-times = {row["gamma"]: row["time"] for row in recording.table if row["offset"] == 0.0}
+def list_times(offset):
+    rows = [row for row in recording.table if row["offset"] == offset]
+    return ", ".join(f"{row['time'] or np.nan:.1f} s (gamma = {row['gamma']:g})" for row in rows)
+
+
 Markdown(
     "<details><summary>Answer</summary>\n\nThe robot with the largest gamma turns last. With the person on the path they arrive after "
-    + ", ".join(f"{time or np.nan:.1f} s (gamma = {gamma:g})" for gamma, time in times.items())
-    + ".\n\n</details>"
+    f"{list_times(0.0)}; with the person 0.8 m beside it, after {list_times(0.8)}.\n\n</details>"
 )
 
 

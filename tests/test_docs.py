@@ -133,7 +133,7 @@ def test_the_numbers_of_the_page_are_those_of_the_tables():
     ours = walkers.set_index("controller")
     assert set(ours["n"]) == {200}
     assert f"reached {100 * ours['mean']['among people']:.1f} % of goals" in text
-    assert f"the defaults {100 * ours['mean']['MPC-CBF']:.0f} %" in text
+    assert f"the defaults {100 * ours['mean']['MPC-CBF']:.1f} %" in text
     steps = (
         table("21_rollouts")
         .query("set == 'all'")
@@ -228,4 +228,4 @@ def test_the_five_results_are_those_of_the_tables():
         100 * walkers.loc["among people", name] for name in ("mean", "low", "high")
     )
     assert f"reached {mean:.1f} % of goals ({low:.1f} to {high:.1f})" in text
-    assert f"the defaults {100 * walkers.loc['MPC-CBF', 'mean']:.0f} %" in text
+    assert f"the defaults {100 * walkers.loc['MPC-CBF', 'mean']:.1f} %" in text

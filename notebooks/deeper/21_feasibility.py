@@ -74,7 +74,7 @@ record = NotebookRecord("21_feasibility", globals(), plaza_zone=True)
 settings = szlib.MPCSettings()
 parameters(
     [
-        ("gamma", gammas, MEASURED, "0.05 everywhere else in this workbook"),
+        ("gamma", gammas, MEASURED, "0.05 in MPCSettings(), 0.1 in among_people()"),
         ("N_h", horizons, PAPER, "steps with a barrier: 2 in the paper; 8 is the whole horizon"),
         ("a_max", limits, ASSUMED, "largest acceleration; 1 m/s² everywhere else"),
         ("worlds", worlds, ASSUMED, "for each cell: 2-4 people, walls in half; the robot starts at rest"),
@@ -272,7 +272,7 @@ record.figure(fig, "answers")
 # <details><summary>Answer</summary>
 #
 # Without the barrier the robot drives through the person. Full braking enters the zone less deeply, but then it
-# stands there: every later step has no solution either, and it never arrives. The relaxed plan enters about as far,
+# stands there: every later step has no solution either, and it never arrives. The relaxed plan enters 8 cm less far,
 # turns aside at once, and goes on.
 #
 # </details>
@@ -618,7 +618,7 @@ failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]].rename(
 # | attack | tried | result |
 # |---|---|---|
 # | random command lines: odd names, places, values, numbers | 1,000 | none hangs, shows a foreign traceback, or changes other files |
-# | damaged results; disks full at each write; clocks that jump | 1,200; 21; 40 | all repaired or refused |
+# | damaged results; disks full at each write; clocks that jump | 1,200; 23; 40 | all repaired or refused |
 # | `extract` and `run` killed at random moments | 100 | identical bytes after a restart, no process left |
 # | steps from random states, settings, people, walls | 51,995 | no step that was reported as safe led to h < 0 or an overlap |
 # | worlds, judged by independent formulas, Euclidean | 11,200 | 25 had h < 0, 1 an overlap with a person; all flagged before |

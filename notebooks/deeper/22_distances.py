@@ -170,7 +170,7 @@ print(f"Beside the learned zone the robot keeps {100 * beside:.1f} cm more than 
 # **In numbers.** The robot ($r$ = 0.5 m) drives straight towards the end of a wall of $L$ = 1 m. When its disc touches
 # the end, the true distance of its centre is $s$ = 0.5 m. The paper's distance adds a *trimming term* $s^2/L$ there:
 # $d = 0.5 + 0.5^2/1$ = **0.75 m**. With a margin of 5 cm the robot may go on until $d$ = 0.55 m. That is at
-# $s$ = 0.40 m: its disc is then 10 cm inside the wall.
+# $s$ = 0.39 m: its disc is then 11 cm inside the wall.
 #
 # **Always.** At the true distance $s$ straight ahead of an end, $d = s + s^2/L$. The disc touches at $s = r$, and
 # nowhere else on the outline at distance $r$ is $d$ longer (proof in `studies.distances`). So the margin must be
@@ -346,7 +346,7 @@ record.check(
 # What we know now
 Markdown(f"""**What we know now.** Around people the approximation errs to the safe side: no margin is needed, and beside
 the learned zone the robot keeps {100 * beside:.0f} cm more than it has to. At the ends of walls shorter than
-{r**2 / eps:g} m the paper's margin is too small, and its restricted pathway has such walls. The right margin is
+{r**2 / eps:g} m the paper's margin is too small, and our restricted pathway has such walls. The right margin is
 $r^2/L$, and the controller keeps it. It costs at most 0.42 r = {42 * r:.0f} cm of space, beside walls as long as the
 robot is wide: describe a row of short pieces as one long wall.""")
 

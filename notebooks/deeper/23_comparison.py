@@ -40,7 +40,7 @@ data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
-worlds = 4  # worlds for each method; 50 for the table that is saved
+worlds = 4  # worlds for each method; 100 for the table that is saved
 n_jobs = 1
 
 # %% jupyter={"source_hidden": true}
@@ -171,7 +171,7 @@ record.figure(fig, "zones-and-formulations")
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# Without a zone the robot is fastest, by a few tenths of a second, and drives through the zones that people keep. Kirby's
+# Without a zone the robot is fastest, by half a second, and drives through the zones that people keep. Kirby's
 # zone is shorter behind the person, so there the robot comes too near. Hall's circle keeps it out as well as the fitted
 # zone does, but with so much space that more robots do not arrive in time. The formulation "rest" must be able to
 # stop within its plan, and so drives more slowly.

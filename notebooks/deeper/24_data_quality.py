@@ -125,8 +125,8 @@ print(f"mean speed: {from_frames.mean():.2f} m/s from frames, {from_seconds.mean
 # |---|---|---|
 # | irregular frames | times between frames differ | bring all people to one clock |
 # | gap: a person is lost for a while | one time between two rows is long | end the track; make up no positions |
-# | jump: another person, or an error of the sensor | a speed that nobody runs | warn, with the number of jumps |
-# | swapped ids: two people who come close exchange their ids | nothing, or a sharp turn | leave out the nearest samples (chapter 03) |
+# | jump: another person, or an error of the sensor | a speed that nobody runs | warn above 100 m; smaller ones show in the fastest second (chapter 01) |
+# | swapped ids: two people who come close exchange their ids | nothing, or a sharp turn | leave out the nearest encounters (chapter 03) |
 # | wrong unit or clock | people move at 1,000 m/s, or nobody walks | refuse the file, and suggest another reading |
 #
 # The next figure has three curves. Each says for which share of frames, or of people, a time is at most so long. *A
@@ -235,7 +235,7 @@ record.figure(figure, "hours")
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# The hour from 12: it has a tenth of the people of the next one, and no mall is so empty at noon. The file holds only a
+# The hour from 12: it has a seventh of the people of the next one, and no mall is so empty at noon. The file holds only a
 # part of this hour.
 #
 # </details>

@@ -108,7 +108,8 @@ record.figure(fig, "verdicts")
 
 # %% [markdown]
 # A row is a claim, a column a place. The *plaza* is synthetic: there the truth is known. The other four are real.
-# An effect above 0 is as the paper says; a hollow square means that the 95 % interval contains 0.
+# An effect above 0 is as the paper says; a hollow square means that the 95 % interval contains 0, or that
+# the zone has too few people on some side.
 # "too few" gives the number of encounters. Units: *share* is the share of cases less one half, one *doubling* is a
 # factor of two.
 #
@@ -325,7 +326,7 @@ record.figure(fig, "coverage")
 # <details><summary>Answer</summary>
 #
 # For the size of the zone in about half of them. The quantile zone lets 5 % of encounters in. Whether
-# that line lies on the true edge, 1 cm inside or 3 cm outside depends on how far people stay away from the edge, their
+# that line lies on the true edge or 3 cm outside depends on how far people stay away from the edge, their
 # *clearance*, and the data does not show the clearance. So the interval answers this question: how far would other people of
 # the same kind move the zone?
 #

@@ -63,7 +63,7 @@ record = NotebookRecord("27_atlas", globals(), plaza_zone=True)
 size = "{:.2f} m x {:.2f} m".format(*REFERENCE.semi_axes)
 parameters(
     [
-        ("gamma of the maps", "0.02 to 0.2", MEASURED, "0.05 elsewhere: chapter 09"),
+        ("gamma of the maps", "0.02 to 0.2", MEASURED, "0.05 in MPCSettings(): chapter 09"),
         ("widths of corridor, passage", "3.0 to 6.4 m, 1.4 to 3.0 m", ASSUMED, "4.6 m and 2.0 m elsewhere"),
         ("speed of the person", "0.3 to 1.1 m/s", ASSUMED, "0.5 m/s in the paper"),
         ("size of the zone", "0.5 to 1.25 times", ASSUMED, f"1 is {size}"),
@@ -142,15 +142,15 @@ for ax, size in zip(grid[:, 0], sizes, strict=True):
     ax.set_ylabel(f"zone x {size:g}\ngamma")
 for ax in grid[-1]:
     ax.set_xlabel("width [m]")
-fig.suptitle("The robot backs out more often if the person is faster or the zone is larger")
+fig.suptitle("The robot goes ahead less often if the person is faster or the zone is larger")
 figures.add_shared_legend([grid[0, 0]])
 record.figure(fig, "corridor")
 
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# It moves to the right: the robot needs a wider corridor to go ahead. It also becomes lower, because a fast person and a
-# large gamma leave no time to brake. The paper's setting, 4.6 m and gamma = 0.05, lies near the edge of the light area: there
+# It moves to the right: the robot needs a wider corridor to go ahead. For a faster person it also becomes lower,
+# because a large gamma leaves no time to brake. Our setting, 4.6 m and gamma = 0.05, lies near the edge of the light area: there
 # small changes decide whether the robot waits.
 #
 # </details>
@@ -197,12 +197,12 @@ ax.set_title(f"gamma = {worst.idxmax():g} is the best of these: {worst.max():.0f
 record.figure(fig, "gamma")
 
 # %% [markdown]
-# With a smaller gamma the robot is pushed back for so long that time runs out. With a larger gamma it drives into places
-# from which there is no way out.
+# With a smaller gamma the robot in the corridor is pushed back for so long that time runs out, and in a narrow passage
+# some steps have no plan. With a larger gamma it drives into places from which there is no way out.
 #
 # ## An example of each
 #
-# For each name, the run that is nearest to gamma = 0.05, to the paper's widths and walking speed, and to the plaza's zone.
+# For each name, the run that is nearest to gamma = 0.05, to our widths, the paper's walking speed, and to the plaza's zone.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -288,7 +288,7 @@ near = corridor[(corridor["width"] == 4.6) & (corridor["pace"] == 0.5)].set_inde
 times = near["time_to_goal"]
 record.key["corridor: to the goal with gamma 0.03, 0.07 [s]"] = [float(times[g, 1.0]) for g in (0.03, 0.07)]
 Markdown(
-    "Gamma does the same. In the paper's corridor the robot arrives after "
+    "Gamma does the same. In a corridor of 4.6 m the robot arrives after "
     f"{times[0.03, 1.0]:.1f} s with gamma = 0.03, and after {times[0.07, 1.0]:.1f} s with gamma = 0.07; "
     f"after {times[0.05, 1.25]:.1f} s with a zone of 1.25 times the size, and after {times[0.05, 0.75]:.1f} s with one of 0.75."
 )
