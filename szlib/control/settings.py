@@ -56,8 +56,8 @@ class MPCSettings:
     """Every parameter of the controller.
 
     `MPCSettings()` has szlib's defaults, `MPCSettings.paper()` the paper's values to the letter.  They differ
-    in the solver, the margin around walls, the rule of the side, the guard and the time limit.  `badges` gives the
-    source of each value.
+    in the solver, the margin around walls, the rule of the side, the guard and the time limit.  `badges`
+    gives the source of each value.
 
     Parameters
     ----------
