@@ -127,13 +127,13 @@ class SimulationLog(Run):
     def save(self, path: str | Path) -> None:
         """Write the run to ``<path>.npz`` (its arrays) and ``<path>.json`` (all else).
 
-        A suffix of `path` is ignored.  Claims are functions and are not saved.
+        One of these two suffixes of `path` is ignored.  Claims are functions and are not saved.
 
         Raises
         ------
         DataError : a file cannot be written.
         """
-        stem = Path(path).with_suffix("")
+        stem = str(path).removesuffix(".npz").removesuffix(".json")
         scenario = self.scenario
         scene = _pick(scenario, "name", "title", "duration")
         for name in ("start", "goal", "walls"):
@@ -157,8 +157,8 @@ class SimulationLog(Run):
         }
         buffer = io.BytesIO()
         np.savez_compressed(buffer, **_pick(self, *_ARRAYS))
-        write_file(stem.with_suffix(".npz"), buffer.getvalue())
-        write_file(stem.with_suffix(".json"), json.dumps(content, indent=1))
+        write_file(f"{stem}.npz", buffer.getvalue())
+        write_file(f"{stem}.json", json.dumps(content, indent=1))
 
     @classmethod
     def load(cls, path: str | Path) -> SimulationLog:
@@ -168,14 +168,14 @@ class SimulationLog(Run):
         ------
         DataError : there is no run, it is damaged, or it has another format version.
         """
-        stem = Path(path).with_suffix("")
+        stem = str(path).removesuffix(".npz").removesuffix(".json")
         try:
-            content = json.loads(read_small(stem.with_suffix(".json")))
+            content = json.loads(read_small(Path(f"{stem}.json")))
             if (content["format"], content["version"]) != (_FORMAT, _VERSION):
                 raise ValueError(
                     f"format {content['format']} {content['version']}, expected {_FORMAT} {_VERSION}"
                 )
-            with open_regular(stem.with_suffix(".npz")) as stream:
+            with open_regular(Path(f"{stem}.npz")) as stream:
                 arrays = dict(np.load(stream))
             zones = tuple(Ellipse(**each) for each in content["zones"])
             people = tuple(

@@ -321,6 +321,18 @@ def test_a_log_with_an_obstacle_of_an_unknown_kind_is_rejected(tmp_path):
         szlib.SimulationLog.load(tmp_path / "run")
 
 
+def test_names_with_a_dot_are_different_runs(tmp_path):
+    scenario = szlib.Scenario("short", (-3.0, 0.0, 0.0, 0.0), (3.0, 0.0))
+    for gamma, seconds in ((0.1, 0.5), (0.4, 1.0)):
+        log = szlib.simulate(scenario, szlib.MPCCBF(ZONE), max_time=seconds)
+        log.save(tmp_path / f"gamma_{gamma}")
+    sizes = [
+        len(szlib.SimulationLog.load(tmp_path / f"gamma_{gamma}").states)
+        for gamma in (0.1, 0.4)
+    ]
+    assert sizes == [6, 11]
+
+
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
 def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
     log = logs[name]
