@@ -184,7 +184,7 @@ def test_excluded_day_is_not_fitted(recording, tmp_path, capsys):
             "--tracks and --exclude belong to a folder of extracted days",
         ),
         (["{missing}"], "missing.csv: no such file"),
-        (["{missing}", "--method", "papr"], "method must be one of paper, hull"),
+        (["{other}", "--method", "papr"], "method must be one of paper, hull"),
         (
             ["{day}", "--exclude", "2012-10-24"],
             "--tracks and --exclude belong to a folder of extracted days",
