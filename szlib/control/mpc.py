@@ -329,7 +329,8 @@ class MPCCBF(Controller):
         question = Question(state, heading.target, last, barriers)
         guess = self._plan + self._change
         if s.solver == "ipopt":
-            inputs = solve_by_ipopt(s, question, guess.clip(-s.a_max, s.a_max))
+            near = self._planner.keep_reachable(question, guess)
+            inputs = solve_by_ipopt(s, near, guess.clip(-s.a_max, s.a_max))
             if inputs is not None:
                 return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
