@@ -369,7 +369,7 @@ class Tracker:
         self._set_clock(now)
         try:
             if not isinstance(people, (list, tuple)):
-                people = np.ma.filled(np.ma.asarray(people, float), np.nan)
+                people = np.ma.filled(np.asanyarray(people, float), np.nan).tolist()
             names = [getattr(each, "id", None) for each in people]
             names = names if ids is None else list(ids)
             given = Counter(names)

@@ -138,9 +138,7 @@ def merge_files(
     Days `excluded` are left out, and rows that `select` leaves out.
     """
     parts = [file.rows for file in files]
-    if len({part.schema["day"] for part in parts}) > 1:
-        parts = [part.with_columns(col.day.cast(String)) for part in parts]
-    merged = wanted = pl.concat(parts)
+    merged = wanted = pl.concat(parts, how="vertical_relaxed")
     if excluded:
         wanted = merged.filter(~col.day.cast(String).is_in(excluded))
     gaps = [file.recipe.max_gap for file in files]
@@ -342,11 +340,18 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
 
     Files without a calendar are recordings of their own, called by their names.  Files of a calendar day are
     its pieces.  Raises DataError where somebody in two of them is in two places at once, or two recordings
-    have the same name.
+    have the same name or the same rows.
     """
     names = name_recordings([file.path for file in files])
     pairs = [*zip(files, names, strict=True)]
     check_names([name for file, name in pairs if file.is_named])
+    known = dict[int, str]()
+    for file, name in pairs:
+        first = known.setdefault(file.rows.drop("day").hash_rows().sum(), name)
+        if file.is_named and first != name:
+            raise DataError(
+                f"{first} and {name} hold the same rows; pass each recording once"
+            )
     named = [file.with_day(name) if file.is_named else file for file, name in pairs]
     rows = pl.concat(
         f.rows.select(col.day.cast(String), "id", "t", "x", "y", file=k)

@@ -206,16 +206,13 @@ def test_excluded_days_are_left_out_and_counted(tmp_path: Path) -> None:
 
 def test_ewap_files_of_one_name_are_recordings_of_their_own(tmp_path: Path) -> None:
     paths = []
-    for name in ("eth", "hotel"):
+    for name, people in (("eth", 2), ("hotel", 3)):
         (tmp_path / name).mkdir()
-        paths.append(write(tmp_path / name / "obsmat.txt", as_ewap(samples())))
+        text = as_ewap(samples(people=people))
+        paths.append(write(tmp_path / name / "obsmat.txt", text))
     assert set(read_raw(paths)["day"]) == {"eth-obsmat", "hotel-obsmat"}
-    assert set(
-        read_raw([paths[0], write(tmp_path / "hotel.txt", as_ewap(samples()))])["day"]
-    ) == {
-        "obsmat",
-        "hotel",
-    }
+    hotel = write(tmp_path / "hotel.txt", paths[1].read_text())
+    assert set(read_raw([paths[0], hotel])["day"]) == {"obsmat", "hotel"}
 
 
 # --- rejected rows -----------------------------------------------------------------------------------

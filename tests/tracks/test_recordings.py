@@ -94,6 +94,21 @@ def alarm() -> None:
 
 
 @pytest.mark.usefixtures("alarm")
+def test_copies_of_a_recording_are_refused_whatever_their_names(tmp_path: Path) -> None:
+    rows = recording(0.0)
+    first = write(tmp_path / "monday.csv", rows)
+    shuffled = write(tmp_path / "again.csv", rows.sample(frac=1, random_state=0))
+    packed = tmp_path / "packed.csv.gz"
+    packed.write_bytes(gzip.compress(first.read_bytes()))
+    for copy in (shuffled, packed):
+        with pytest.raises(szlib.DataError, match="monday and .* hold the same rows"):
+            szlib.read_tracks([first, copy])
+    with pytest.raises(szlib.DataError, match="hold the same rows"):
+        szlib.read_tracks([rows, rows])
+    others = write(tmp_path / "tuesday.csv", recording(0.1))
+    assert szlib.read_tracks([first, others])["day"].nunique() == 2
+
+
 def test_only_regular_files_are_read(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "fifo.csv")
     for path in (tmp_path / "fifo.csv", Path("/dev/zero")):
