@@ -180,6 +180,9 @@ def as_controller(controller: Any) -> Controller:
     """
     if isinstance(controller, Controller):
         return controller
+    expected = "an object with reset and step"
+    has_step = hasattr(controller, "step")
+    require(has_step, "controller", controller, expected, SolverError)
     found = Controller()
     for name in ("reset", "step", "settings", "zone", "walls", "obstacles", "robot"):
         value = getattr(controller, name, None)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from time import perf_counter
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from ..control import Controller, MPCSettings, Obstacle, Person, as_controller
 from ..control.people import SpeedZone, as_ellipse
-from ..core.checks import Array
+from ..core.checks import Array, check_array, require
 from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .crowds import UNAFFECTED, Crowd, CrowdModel
@@ -99,7 +100,7 @@ def simulate(
 
     Raises
     ------
-    SolverError : the controller has other walls or obstacles, or gives a control that is not finite. For an
+    SolverError : the controller has other walls or obstacles, or gives a control that cannot be used. For an
         `MPCCBF` also: the start violates a barrier or the speed limit, or the goal cannot be reached, because
         it lies too close to a wall or in the zone of a person who stands.
 
@@ -141,7 +142,7 @@ def _list_numbers(obstacles: Iterable[Obstacle]) -> list[tuple[Any, ...]]:
 
 
 def drive(
-    scenario: Scenario, controller: Controller, loop: LoopSettings | None = None
+    scenario: Scenario, controller: Controller, loop: LoopSettings = LoopSettings()
 ) -> SimulationLog:
     """Run the loop from any start, without the checks of `simulate`, and with any behaviour of people.
 
@@ -149,12 +150,13 @@ def drive(
     ----------
     scenario : the scene.
     controller : an `MPCCBF`, or any other `szlib.control.Controller`.
-    loop : how the loop runs; default: `LoopSettings()`.
+    loop : how the loop runs.
 
     Raises
     ------
-    SolverError : a control is not finite, the crowd changes its size, or the controller's dt is not that of
-        `loop.settings`. For an `MPCCBF` also: the goal lies too close to a wall.
+    SolverError : a control is not finite or has another length than `robot.inputs`, `max_time` is not
+        positive, the crowd changes its size, or the controller's dt is not that of `loop.settings`. For an
+        `MPCCBF` also: the goal lies too close to a wall.
 
     Examples
     --------
@@ -166,7 +168,6 @@ def drive(
     >>> log.metrics()["unflagged_overlaps"]
     0
     """
-    loop = loop or LoopSettings()
     controller = as_controller(controller)
     settings = loop.settings or controller.settings or MPCSettings()
     if controller.settings and controller.settings.dt != settings.dt:
@@ -178,6 +179,7 @@ def drive(
     people = _People(scenario, zone, loop, settings)
     recorder = _Recorder()
     duration = scenario.duration if loop.max_time is None else loop.max_time
+    require(0 < duration < inf, "max_time", duration, "positive", SolverError)
     arrival: int | None = None
     controller.reset()
     own = robot.start(scenario.start)
@@ -194,11 +196,8 @@ def drive(
             arrival = k
             if loop.until_arrival:
                 break
-        control = recorder.controls[-1]
-        if not np.isfinite(control).all():
-            raise SolverError(
-                f"{scenario.name!r}: the controller gave {control.tolist()} at {time:g} s"
-            )
+        name = f"the control at {time:g} s"
+        control = check_array(name, recorder.controls[-1], (len(robot.inputs),))
         own = robot.advance(own, control, settings.dt)
     return SimulationLog(
         scenario=scenario,

@@ -323,16 +323,9 @@ def compare(
         _find_methods(behaviours, BEHAVIOURS),
     ]
     tables = []
-    for controller, zone, formulation, behaviour in product(*choices):
-        setup = RolloutSetup(
-            settings=choices[2][formulation],
-            worlds=worlds,
-            behaviour=choices[3][behaviour],
-            controller=choices[0][controller],
-            zone_transform=choices[1][zone],
-            measure=measure,
-        )
-        names = (controller, zone, formulation, behaviour)
+    for chosen in product(*(each.items() for each in choices)):
+        names, (controller, zone, settings, behaviour) = zip(*chosen, strict=True)
+        setup = RolloutSetup(settings, worlds, behaviour, controller, zone, measure)
         table = rollouts(n, setup, **options)
         tables.append(table.assign(**dict(zip(METHOD, names, strict=True))))
     return pd.concat(tables, ignore_index=True)

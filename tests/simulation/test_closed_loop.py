@@ -323,8 +323,14 @@ class Broken(Straight):
         (
             Broken(control=[np.nan, 0.0]),
             None,
-            r"the controller gave \[nan, 0.0\] at 0 s",
+            r"the control at 0 s must be finite; got .*nan",
         ),
+        (
+            Broken(control=np.zeros(3)),
+            None,
+            r"the control at 0 s must have shape \(2,\)",
+        ),
+        (None, None, "controller must be an object with reset and step"),
         (
             Broken(residual=np.zeros((1, 2))),
             lambda t, _: [person(0.0, y) for y in (2, 3)],
@@ -336,6 +342,12 @@ class Broken(Straight):
 def test_invalid_controllers_and_crowds_are_rejected(controller, crowd, message):
     with pytest.raises(szlib.SolverError, match=message):
         szlib.simulate(WALK, controller, crowd=crowd, max_time=2.0)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, np.inf, np.nan])
+def test_time_limits_that_are_not_positive_are_rejected(seconds):
+    with pytest.raises(szlib.SolverError, match="max_time must be positive"):
+        szlib.simulate(WALK, Straight(), max_time=seconds)
 
 
 EDGE = szlib.control.HalfPlane(point=(0.0, -1.0), normal=(0.0, 1.0))

@@ -101,7 +101,7 @@ def test_copies_of_a_recording_are_refused_whatever_their_names(tmp_path: Path) 
     packed = tmp_path / "packed.csv.gz"
     packed.write_bytes(gzip.compress(first.read_bytes()))
     for copy in (shuffled, packed):
-        with pytest.raises(szlib.DataError, match="monday and .* hold the same rows"):
+        with pytest.raises(szlib.DataError, match=r"monday and .* hold the same rows"):
             szlib.read_tracks([first, copy])
     with pytest.raises(szlib.DataError, match="hold the same rows"):
         szlib.read_tracks([rows, rows])
