@@ -35,7 +35,7 @@ class SocialEnv(gymnasium.Env):
     scenarios : makes a scenario from a seed, such as `szlib.Worlds()`.
     zone : the zone of people who have none of their own.
     settings : dt, a_max, v_max, r_robot, eps and zone_speed are used.
-    behaviour : how people move, such as `szlib.simulation.ReactingPeople()`; they are observed without noise.
+    behaviour : how people move, such as `szlib.simulation.ReactingPeople("orca")`; they are observed without noise.
     """
 
     def __init__(

@@ -230,9 +230,9 @@ class DifferentialDrive(MPCCBF):
     v_max : speed that it can reach [m/s]; see `ahead`.
     chord_error : largest distance of the point from the straight line between two samples [m].
     goal_clearance : distance of a goal from walls, and from zones of people who stand, at which it can be
-        reached from any side [m]; the disc's centre comes to within 5 cm, at any heading. At a closer goal
-        the robot turns its back to the obstacle and goes backwards; it needs about `goal_clearance` - 2
-        `ahead` there, else it may miss the goal by up to 2 `ahead`.
+        reached from any side [m]; the disc's centre comes to within 7 cm, at any heading. At a closer goal
+        the robot turns its back to the obstacle and goes backwards; it needs about `goal_clearance` -
+        `ahead` there, else it moves about near the goal, some 2 `ahead` from it.
 
     Raises
     ------

@@ -221,7 +221,8 @@ class Step:
     def h(self) -> Array:
         """Barriers in the state itself, shape (obstacles,) [m].
 
-        Where one is negative, the robot already is where it should not be, and the plan leads out again.
+        Where one is negative, the robot already is where it should not be, and the plan leads out
+        again; a robot that overlaps a body rests instead, if it cannot leave without moving towards it.
         """
         return self.scene.barriers.h(*self.scene.state[:2])
 
@@ -397,7 +398,7 @@ class Step:
     def _advise(self, row: Row) -> str:
         s = self.scene.settings
         if (self.h < -TOLERANCE).any():
-            return "nothing now, because the robot is already too close; the plan leads out again"
+            return "nothing now, because the robot is already too close; it leaves as it can"
         if row.kind == "speed":
             return f"start at v_max = {s.v_max:g} m/s or slower, or raise v_max"
         if row.kind == "end":

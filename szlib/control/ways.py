@@ -564,7 +564,7 @@ def _name(m: Map, way: Way, near: Surroundings, turns: Array) -> str:
         found.append((_TIMES[k], f"{side} person {number}"))
     words = ", ".join(word for _, word in sorted(found)[:3])
     is_straight = moved.sum() < 1.05 * dist(way.points[-1], way.points[0]) + m.cell
-    return words or ("straight to the goal" if is_straight else "around walls")
+    return words or ("straight to the goal" if is_straight else "around obstacles")
 
 
 def _find_door(m: Map, way: Way) -> list[tuple[float, str]]:

@@ -298,6 +298,9 @@ class _Recorder:
         duration: float,
     ) -> None:
         """Record a `step`, which took a `duration` [s], and the places of the people `seen`."""
+        expected = "an object with control"
+        has_control = hasattr(step, "control")
+        require(has_control, "what step returns", step, expected, SolverError)
         self._states.append(state)
         self.controls.append(np.asarray(step.control, float))
         self._seen.append(seen)
@@ -309,10 +312,9 @@ class _Recorder:
                 self._headings[i] = person.heading
             heading = self._headings.get(i, 0.0)
             self._people += (*person.position, heading, *person.velocity)
+        defaults = _UNREPORTED | {"solve_time": duration}
         for name, column in self._reported.items():
-            column.append(getattr(step, name, _UNREPORTED[name]))
-        if self._reported["solve_time"][-1] is None:
-            self._reported["solve_time"][-1] = duration
+            column.append(getattr(step, name, defaults[name]))
 
     def collect(self, n_people: int, n_fixed: int) -> dict[str, Any]:
         """The arrays of the run, as of `Run`."""
@@ -326,7 +328,7 @@ class _Recorder:
             "residual": _align_residuals(
                 reported["residual"], self._seen, n_people, n_fixed
             ),
-            "status": np.array(reported["status"]),
+            "status": np.array(reported["status"], str),
             "safe": np.array(reported["safe"], bool),
             "has_safety_claims": reported["safe"][0] is not None,
             **{name: np.array(reported[name], float) for name in numbers},

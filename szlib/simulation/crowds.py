@@ -106,8 +106,8 @@ class Behaviour:
         heading = (atan2(vy, vx) if person.heading is None else person.heading) + turn
         speed = self.pace * hypot(vx, vy)
         velocity = (speed * cos(heading), speed * sin(heading))
-        position = person.after(time).position
-        return time, Person(position, velocity, heading, person.zone, person.id)
+        now = person.after(time)
+        return time, replace(now, velocity=velocity, heading=heading, prediction=None)
 
     def observe(
         self, people: tuple[Person, ...], rng: np.random.Generator
@@ -477,6 +477,7 @@ class _ReactingCrowd:
                     velocity=velocity,
                     heading=heading,
                     heading_unknown=heading is None,
+                    prediction=None,
                 )
                 people.append(moved)
             self._people = tuple(people)

@@ -317,6 +317,11 @@ class Broken(Straight):
         return SimpleNamespace(**({"control": np.zeros(2)} | self.more))
 
 
+class Silent(Straight):
+    def step(self, state, goal, people):
+        """It forgets to return what it decides."""
+
+
 @pytest.mark.parametrize(
     ("controller", "crowd", "message"),
     [
@@ -331,6 +336,7 @@ class Broken(Straight):
             r"the control at 0 s must have shape \(2,\)",
         ),
         (None, None, "controller must be an object with reset and step"),
+        (Silent(), None, "what step returns must be an object with control; got None"),
         (
             Broken(residual=np.zeros((1, 2))),
             lambda t, _: [person(0.0, y) for y in (2, 3)],

@@ -16,8 +16,9 @@ from studies.replay import (
 )
 
 import szlib
-from szlib.control.people import Person
+from szlib.control.people import Person, Prediction
 from szlib.simulation.crowds import (
+    Behaviour,
     ModelFactory,
     ReactingPeople,
     SocialForceModel,
@@ -114,6 +115,19 @@ def test_people_walk_to_given_goals(model):
     )
     path = walk(crowd, seconds=25.0)[:, 0]
     assert np.hypot(*(path[-1, :2] - (3.0, 4.0))) < 0.6
+
+
+def test_people_who_react_keep_no_outdated_prediction_but_their_group(model):
+    ahead = Prediction(times=[1.0, 2.0], positions=[(0.5, 0.0), (1.0, 0.0)])
+    person = Person((0.0, 0.0), (0.5, 0.0), prediction=ahead, group="pair")
+    reacting = ReactingPeople(model).start(scene(person), 0)
+    changing = Behaviour(pace=0.5).start(scene(person), 0)
+    for crowd in (reacting, changing):
+        crowd(0.0, FAR)
+        later = crowd(6.0, FAR)[0]
+        assert (later.prediction, later.group) == (None, "pair")
+        expected = np.add(later.position, later.velocity)
+        assert later.after(1.0).position == pytest.approx(expected)
 
 
 def test_the_same_seed_gives_the_same_people_and_another_seed_others(
