@@ -52,18 +52,6 @@ from .finding import find_encounters, find_place, select_near
 from .geometry import Area, AttentionalSpace
 from .settings import EncounterSettings
 
-# Advice by a word of the condition that rejected everything; the last one fits all others.
-_ADVICE = {
-    "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
-    "not in the area": 'give an area in which people walked: four numbers or a polygon, or "auto"',
-    "slow": "are unit and frame rate right? else pass a smaller min_speed",
-    "velocity": "tracks are single points: pass a longer max_gap, or join the ids of one person",
-    "ends": "tracks are short or broken: pass a longer max_gap, or a shorter duration",
-    "nobody": "people were never near each other: more data, or a larger space",
-    "several": "it was crowded: a smaller space",
-    "nearer": "people came into view late: pass a smaller min_distance",
-    "": "more data, or other conditions (szlib.find_encounters)",
-}
 # of the cached result of a day; a result of another version is computed again
 _VERSION = 11
 # purpose of an extraction's folder, as its marker states it
@@ -98,27 +86,6 @@ def find_area(
     with warnings.catch_warnings(action="ignore", category=DataWarning):
         tracks = read_tracks(files, recipe=recipe)
     return find_place(tracks, settings)[1]
-
-
-def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return the `samples` if there are any; else raise DataError: the stage that rejected everything, why,
-    and what to do."""
-    if len(samples):
-        return samples
-    entered = [stage for stage in funnels.get(samples) if stage["entered"]]
-    emptied = next((stage for stage in entered if not stage["kept"]), None)
-    if emptied is None:
-        raise DataError(
-            "the table of samples is empty, and has no funnel that says why"
-        )
-    rejected = emptied["rejected"]
-    rows = ", ".join(f"{count:,} {reason}" for reason, count in rejected.items())
-    *_, last = rejected
-    advice = next(text for words, text in _ADVICE.items() if words in last)
-    raise DataError(
-        f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
-        f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {advice}"
-    )
 
 
 def describe_source(

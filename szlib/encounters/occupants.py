@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -134,6 +135,24 @@ class TrackRows:
     def distance(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Distance between the positions of rows `one` and `other` [m]."""
         return np.asarray(np.abs(self.place[other] - self.place[one]))
+
+    def around(
+        self, values: np.ndarray, at: np.ndarray, steps: np.ndarray
+    ) -> np.ndarray:
+        """The `values` that lie `steps` [ticks] after the rows `at`; NaN past a gap."""
+        start = at[..., None]
+        there = (start + steps) % len(self)  # beyond the ends: another piece
+        is_same = self.piece[there] == self.piece[start]
+        return np.where(is_same, values[there], np.nan)
+
+    def approach(self, pairs: np.ndarray, begin: Any, end: Any) -> np.ndarray:
+        """Nearest approach of `pairs` of rows (2, n) from `begin` to `end` [s], if both walk on [m]."""
+        apart, relative = (
+            each[pairs[1]] - each[pairs[0]] for each in (self.place, self.velocity)
+        )
+        square = np.maximum(np.abs(relative) ** 2, 1e-9)
+        time = -(apart * relative.conj()).real / square
+        return np.asarray(np.abs(apart + np.clip(time, begin, end) * relative))
 
     def select(self, rows: np.ndarray) -> TrackRows:
         """Some of these `rows` (a mask or indices), with the numbers of their people and pieces."""

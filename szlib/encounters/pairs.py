@@ -175,7 +175,8 @@ class Crowd:
     @cached_property
     def ways(self) -> np.ndarray:
         """Positions from 1 s before to 1 s after the `whole_seconds`, NaN out of the area, (n, 21)."""
-        return self._values_around(self.rows.place, self.whole_seconds, _STEPS)
+        place = np.where(self.inside, self.rows.place, np.nan)
+        return self.rows.around(place, self.whole_seconds, _STEPS)
 
     @cached_property
     def unit(self) -> np.ndarray:
@@ -201,15 +202,17 @@ class Crowd:
     @cached_property
     def sensor(self) -> SensorCheck:
         """What the tracks say about the sensor."""
-        met = self.meet(CLOSE)
         rows = self.rows
-        near = self._near_rows(met, np.flatnonzero(met.kind > 0), CLOSE)
-        found = count_ends(rows, self.inside, near[1:])
+        at = self.whole_seconds
+        begin = firsts(rows.piece)
+        ends = np.stack([begin, np.append(begin[1:], len(rows)) - 1])
+        left = (ends[:, rows.piece[at]] - at) / TICKS_PER_SECOND
+        found = count_ends(self.coarse_rows, self.inside[at], left, self.unit)
         found |= measure_noise(rows, self.inside)
+        met = self.meet(CLOSE)
         passing = met.rows[:, (met.kind > _STANDING) & (met.nearest < NEAR_END)]
-        velocity = self._values_around(
-            rows.velocity, passing, np.array([-BEFORE, BEFORE])
-        )
+        velocity = np.where(self.inside, rows.velocity, np.nan)
+        velocity = rows.around(velocity, passing, np.array([-BEFORE, BEFORE]))
         velocity = velocity[:, np.isfinite(velocity).all(axis=(0, 2))]
         exchanged = count_exchanged(velocity[..., 0], velocity[..., 1])
         return SensorCheck(**found, passes=velocity.shape[1], exchanged=exchanged)
@@ -231,7 +234,7 @@ class Crowd:
         pairs = np.concatenate(list(found), axis=1)
         pairs = pairs[:, np.diff(group[pairs], axis=0)[0] != 0]
         # A person who has just come into the area may have been nearer almost a second ago.
-        pairs = pairs[:, _likely_nearest(rows, pairs, 1.0) < r_max + _TURN]
+        pairs = pairs[:, rows.approach(pairs, -1.0, 1.0) < r_max + _TURN]
         near = np.sort(pairs, axis=0)  # rows are in the order of people
         one, other = rows.person[near]
         key = one * len(self.unit) + other
@@ -254,35 +257,18 @@ class Crowd:
 
         `tracks` is the track table of the crowd.
         """
-        near = self._near_rows(met, pairs, r_max)
-        key = near[0] * len(self.rows) + near[1]
-        near = near[:, np.unique(key, return_index=True)[1]]
-        samples = sample_rows(tracks, self.rows, *near)
-        samples["kind"] = name_kinds(met.kind[near[0]])
-        samples["third"] = met.third[near[0]]
-        return samples
-
-    def _near_rows(self, met: Meetings, pairs: np.ndarray, r_max: float) -> np.ndarray:
-        """Where some `pairs` of `met` are within `r_max` [m]: the pair, and the two people's rows, (3, n).
-
-        A moment between two whole seconds is given twice, once by each of them.
-        """
         wanted = np.isin(met.of_pair, pairs)
         near = met.near[:, wanted]
-        of_pair = met.of_pair[wanted]
         moment, step = np.nonzero(self._distances(near) < r_max)
-        both = self.whole_seconds[near[:, moment]] + _STEPS[step]
-        return np.stack([of_pair[moment], *both])
-
-    def _values_around(
-        self, values: np.ndarray, at: np.ndarray, steps: np.ndarray
-    ) -> np.ndarray:
-        """The `values` that lie `steps` [ticks] after the rows `at`; NaN out of the area, or past a gap."""
-        start = at[..., None]
-        piece = self.rows.piece
-        around = (start + steps) % len(piece)  # beyond the ends: another piece
-        known = self.inside[around] & (piece[around] == piece[start])
-        return np.where(known, values[around], np.nan)
+        one, other = self.whole_seconds[near[:, moment]] + _STEPS[step]
+        pair = met.of_pair[wanted][moment]
+        # a moment between two whole seconds is found from each of them
+        first = np.unique(pair * len(self.rows) + one, return_index=True)[1]
+        pair = pair[first]
+        samples = sample_rows(tracks, self.rows, pair, one[first], other[first])
+        samples["kind"] = name_kinds(met.kind[pair])
+        samples["third"] = met.third[pair]
+        return samples
 
     def _distances(self, near: np.ndarray) -> np.ndarray:
         """Distances of two people around the `coarse_rows` `near` [m], NaN out of the area, (n, 21)."""
@@ -292,7 +278,7 @@ class Crowd:
         self, near: np.ndarray, of_pair: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of each pair: its rows where it is nearest (2, n), the distance [m], and the position in `near`."""
-        likely = _likely_nearest(self.coarse_rows, near, 0.5)
+        likely = self.coarse_rows.approach(near, -0.5, 0.5)
         likely[~self.inside[self.whole_seconds[near]].all(axis=0)] += 2 * REACH
         least = np.minimum.reduceat(likely, firsts(of_pair))
         at = np.flatnonzero(likely == least[of_pair])
@@ -318,10 +304,3 @@ class Crowd:
         close = near[:, self.coarse_rows.distance(*near) < r_max]
         around = np.bincount(close.ravel(), minlength=len(self.coarse_rows))
         return np.asarray(np.maximum(around[near[:, at]].max(axis=0) - 1, 0))
-
-
-def _likely_nearest(rows: TrackRows, pairs: np.ndarray, seconds: float) -> np.ndarray:
-    """Nearest approach of `pairs` of rows (2, n) within so many `seconds`, if both people walk on [m]."""
-    apart, relative = (v[pairs[1]] - v[pairs[0]] for v in (rows.place, rows.velocity))
-    time = -(apart * relative.conj()).real / np.maximum(np.abs(relative) ** 2, 1e-9)
-    return np.asarray(np.abs(apart + np.clip(time, -seconds, seconds) * relative))

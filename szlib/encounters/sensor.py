@@ -1,9 +1,11 @@
 """What tracks say about the sensor that made them: the people it loses, its noise, and the ids it exchanges.
 
 A tracker can fake respect: one that loses one of two people who come near each other leaves no pair nearer
-than the distance that it resolves, as if they kept apart. It shows where tracks end and begin: in a merging
-tracker most tracks that end inside the area do so beside somebody else. So at each distance the share of ends
-with a stranger there is compared with the share of all samples.
+than the distance that it resolves, as if they kept apart. It shows where tracks end: most of them end where
+somebody would come near within `AHEAD` seconds, if both walked on (and begin where somebody had come near).
+So at each such distance the share of samples at which a track ends is compared with the share at all larger
+distances. A tracker may lose people some time before they are near; so where they vanish is not resolved,
+either.
 
 Noise: a walking person's path is smooth. So the fourth difference of positions, at the rate of the sensor, is
 mostly its error: of a variance 70 times that of a position. Where tracks were interpolated, only the ticks at
@@ -23,17 +25,18 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import beta, quantile_test
+from scipy.stats import beta, gamma, quantile_test
 
-from .occupants import TrackRows
+from .occupants import TrackRows, find_neighbours
 
 NEAR_END = 0.6
-"""Distance at which somebody is near the end of a track, or passes close by [m]."""
+"""Distance within which somebody comes near the end of a track, or passes close by [m]."""
 
-_EDGES = np.r_[
-    0, np.arange(0.2, 1.25, 0.1)
-]  # of the distances at which ends are counted [m]
-# A sound tracker has at most so many times as many ends as samples at a distance.
+AHEAD = 2.0
+"""Time for which two people are taken to walk on [s] (assumed)."""
+_FARTHEST = 2.0  # approaches up to this are looked at [m]
+_REACH = 6.0  # of people who may come so near within `AHEAD` [m]
+# A sound tracker ends at most so many times as many tracks at a distance as beyond.
 _MOST = 2.0
 _FEWEST = 5  # ends that say something
 _SMALL = 0.005  # level at which a distance counts as not resolved
@@ -56,8 +59,10 @@ class SensorCheck:
 
     Parameters
     ----------
-    ends, samples : number of beginnings and ends of tracks inside the area, and of all samples there.
-    ends_near, ends_low, ends_high : share of the ends with a stranger within 0.6 m, and its interval.
+    ends, samples : number of begins and ends of tracks inside the area, and of all samples there, one a
+        second, each looked at backward and forward.
+    ends_near, ends_low, ends_high : share of the ends at which a stranger would come within 0.6 m (see the
+        top of this module), and its interval.
     samples_near : the same share of all samples.
     resolved : distance beyond which no more tracks end than elsewhere [m]; 0: at every distance.
     noise, noise_low, noise_high : standard error of a position [m], the median over people, and its interval;
@@ -97,7 +102,8 @@ class SensorCheck:
         if self.ends:
             ends = (
                 f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
-                f"of tracks have somebody within {NEAR_END:g} m, and {self.samples_near:.1%} of all samples"
+                f"of tracks are where somebody would come within {NEAR_END:g} m, and {self.samples_near:.1%} "
+                "of all samples"
             )
         if self.noise:
             low = 100 * self.noise_low
@@ -113,34 +119,42 @@ class SensorCheck:
 
 
 def count_ends(
-    rows: TrackRows, inside: np.ndarray, pairs: np.ndarray
+    rows: TrackRows, inside: np.ndarray, left: np.ndarray, unit: np.ndarray
 ) -> dict[str, Any]:
     """Compare the ends of tracks with all samples: the fields of `SensorCheck` from ends to resolved.
 
     Parameters
     ----------
-    rows : of the tracks, by person and time.
+    rows : of the tracks at whole seconds, by person and time.
     inside : whether each of them is in the area.
-    pairs : rows of two strangers at one moment who are near each other, shape (2, n).
+    left : time from each of them to the begin, and to the end, of its track, shape (2, n) [s].
+    unit : number of the unit of each person: only others are strangers.
     """
-    breaks = np.diff(rows.piece) != 0
-    recorded = (rows.tick > rows.tick.min() + 1) & (rows.tick < rows.tick.max() - 1)
-    is_end = (np.r_[True, breaks] | np.r_[breaks, True]) & inside & recorded
-    nearest = np.full(len(rows), np.inf)
-    distance = rows.distance(*pairs)
-    for each in pairs:
-        np.minimum.at(nearest, each, distance)
-    ends = nearest[is_end]
-    samples = nearest[inside]
-    n = len(ends)
-    near, common = (np.histogram(d, _EDGES)[0] for d in (ends, samples))
-    expected = common / max(len(samples), 1)
-    least = beta.ppf(_SMALL, near, n - near + 1)
-    is_lost = (near >= _FEWEST) & (least > _MOST * expected)
-    resolved = float(_EDGES[1:][is_lost].max(initial=0.0))
-    low, high = _interval_of_share(int((ends < NEAR_END).sum()), n)
+    is_end = inside & (np.abs(left) < 1)
+    left = np.where(is_end, left, 0.0)
+    approach = np.full(left.shape, np.inf)
+    distance = approach.copy()
+    for pairs in find_neighbours(rows.place, rows.moment, _REACH):
+        own, others = unit[rows.person[pairs]]
+        pairs = pairs[:, own != others]
+        for side, begin in enumerate((-AHEAD, 0.0)):
+            nearest = rows.approach(pairs, begin, begin + AHEAD)
+            for one, other in (pairs, pairs[::-1]):
+                np.minimum.at(approach[side], one, nearest)
+                is_least = nearest == approach[side, one]
+                least = np.stack([one, other])[:, is_least]
+                then = left[side, least[0]]
+                distance[side, least[0]] = rows.approach(least, then, then)
+    ends = approach[is_end]
+    samples = approach[:, inside].ravel()
+    resolved = _find_excess(ends, samples, _FARTHEST)
+    if resolved:
+        lost = inside & (approach < resolved)
+        vanish = _find_excess(distance[lost & is_end], distance[lost], _REACH)
+        resolved = max(resolved, vanish)
+    low, high = _interval_of_share(int((ends < NEAR_END).sum()), len(ends))
     return {
-        "ends": n,
+        "ends": len(ends),
         "samples": len(samples),
         "ends_near": _share(ends < NEAR_END),
         "ends_low": low,
@@ -150,40 +164,37 @@ def count_ends(
     }
 
 
+def _find_excess(ends: np.ndarray, samples: np.ndarray, farthest: float) -> float:
+    """Distance up to which more of the `samples` are `ends` than at larger ones [m]; 0: nowhere.
+
+    Both are distances [m], of which those up to the `farthest` are looked at.
+    """
+    edges = np.r_[0.0, np.arange(0.2, farthest + 0.05, 0.1)]
+    near, common = (np.histogram(each, edges)[0] for each in (ends, samples))
+    beyond = (len(ends) - near.cumsum() + 1) / (len(samples) - common.cumsum() + 1)
+    is_more = gamma.ppf(_SMALL, near) > _MOST * beyond * common
+    return float(edges[1:][is_more & (near >= _FEWEST)].max(initial=0.0))
+
+
 def measure_noise(rows: TrackRows, inside: np.ndarray) -> dict[str, Any]:
     """Measure the error of positions: the fields of `SensorCheck` that begin with noise.
 
-    `rows` and `inside` are as in `count_ends`.
+    `rows` are those of the tracks, by person and time; `inside` says whether each of them is in the area.
     """
-    at = _same_piece(rows, np.arange(len(rows)), 1)
-    bends = np.abs(_differences(rows, at, 1, _SECOND)) > _BENT
-    lag = int(np.clip(np.rint(1 / max(_share(bends), 1e-9)), 1, _MOST_LAG))
-    at = _same_piece(rows, at[bends], 2 * lag)
-    at = at[inside[at]]
-    variance = (
-        np.abs(_differences(rows, at, lag, _FOURTH)) ** 2 / (_FOURTH**2).sum() / 2
-    )
-    of_person = pd.Series(variance).groupby(rows.person[at]).agg(["mean", "size"])
-    is_measured = of_person["size"] >= _FEWEST_KNOTS
+    every = np.arange(len(rows))
+    bend = np.abs(rows.around(rows.place, every, np.arange(-1, 2)) @ _SECOND)
+    share = _share(bend[np.isfinite(bend)] > _BENT)
+    lag = int(np.clip(np.rint(1 / max(share, 1e-9)), 1, _MOST_LAG))
+    at = np.flatnonzero(inside & (bend > _BENT))
+    fourth = rows.around(rows.place, at, lag * np.arange(-2, 3)) @ _FOURTH
+    variance = pd.Series(np.abs(fourth) ** 2 / (_FOURTH**2).sum() / 2)
+    of_person = variance.groupby(rows.person[at]).agg(["mean", "count"])
+    is_measured = of_person["count"] >= _FEWEST_KNOTS
     errors = np.sqrt(of_person["mean"][is_measured])
     if len(errors) <= _FEWEST:
         return {}
     low, high = quantile_test(errors, p=0.5).confidence_interval(0.95)
     return {"noise": float(errors.median()), "noise_low": low, "noise_high": high}
-
-
-def _same_piece(rows: TrackRows, at: np.ndarray, reach: int) -> np.ndarray:
-    """Those rows `at` whose piece of track goes on for `reach` steps before and after them."""
-    at = at[(at >= reach) & (at < len(rows) - reach)]
-    return np.asarray(at[rows.piece[at - reach] == rows.piece[at + reach]])
-
-
-def _differences(
-    rows: TrackRows, at: np.ndarray, lag: int, weights: np.ndarray
-) -> np.ndarray:
-    """Differences of positions around the rows `at`, `lag` steps apart, with these `weights`."""
-    steps = lag * (np.arange(len(weights)) - len(weights) // 2)
-    return np.asarray(rows.place[at[:, None] + steps] @ weights)
 
 
 def count_exchanged(before: np.ndarray, after: np.ndarray) -> int:

@@ -32,7 +32,7 @@ from ..tracks import datasets
 from ..zones.outliers import R_MAX
 from ..zones.social_zone import FORMAT, check_method
 from ..zones.uncertainty import N_RESAMPLES
-from ..zones.verdict import describe_missing_encounters
+from ..zones.verdict import describe_missing_encounters, require_encounters
 from .folders import read_json_object, require_place
 from .record.data_cache import find_null_model
 
@@ -154,7 +154,7 @@ def _fit_files(
                 f"{error}; the paper's zone of lone encounters may still be found: --method paper"
             ) from error
     samples = find_encounters(table, settings=settings)
-    several_days.require_encounters(samples)
+    require_encounters(samples)
     return _fit_lone_encounters(samples, table, settings, method, kind), table
 
 

@@ -10,11 +10,15 @@ A zone alone cannot tell: every method returns one for people who ignore each ot
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from ..core.errors import DataError
 from .ellipses import find_neighbours
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 USABLE = "usable"
 UNDECIDED = "undecided"
@@ -31,6 +35,19 @@ WIDEST = 0.6
 SIGNIFICANCE = 0.05
 # Encounters within r_max from which on the test finds a core of 0.8 m in more than 90 % of crowds.
 MIN_TESTED = 60
+
+# Advice by a word of the condition that rejected everything; the last one fits all others.
+_ADVICE = {
+    "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
+    "not in the area": 'give an area in which people walked: four numbers or a polygon, or "auto"',
+    "slow": "are unit and frame rate right? else pass a smaller min_speed",
+    "velocity": "tracks are single points: pass a longer max_gap, or join the ids of one person",
+    "ends": "tracks are short or broken: pass a longer max_gap, or a shorter duration",
+    "nobody": "people were never near each other: more data, or a larger space",
+    "several": "it was crowded: a smaller space",
+    "nearer": "people came into view late: pass a smaller min_distance",
+    "": "more data, or other conditions (szlib.find_encounters)",
+}
 
 
 FittedZone = Any
@@ -174,3 +191,26 @@ def _interval(zone: FittedZone, speed: float, quantity: str) -> Any:
         return np.nan, np.nan
     intervals = zone.uncertainty.intervals.set_index(["speed", "quantity"])
     return intervals.loc[(speed, quantity), ["low", "high"]].to_numpy()
+
+
+def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return the `samples` if there are any; else raise DataError: the stage that rejected everything, why,
+    and what to do."""
+    from ..tracks import funnels  # a robot needs no Polars
+
+    if len(samples):
+        return samples
+    entered = [stage for stage in funnels.get(samples) if stage["entered"]]
+    emptied = next((stage for stage in entered if not stage["kept"]), None)
+    if emptied is None:
+        raise DataError(
+            "the table of samples is empty, and has no funnel that says why"
+        )
+    rejected = emptied["rejected"]
+    rows = ", ".join(f"{count:,} {reason}" for reason, count in rejected.items())
+    *_, last = rejected
+    advice = next(text for words, text in _ADVICE.items() if words in last)
+    raise DataError(
+        f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
+        f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {advice}"
+    )

@@ -45,6 +45,26 @@ def test_exchanged_ids_are_seen_and_passes_alone_are_not():
     )
 
 
+@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize(
+    ("reach", "early"), [(0.45, 0.0), (0.45, 1.0), (0.6, 0.5), (0.6, 1.5), (1.5, 0.0)]
+)
+def test_people_who_are_lost_are_noticed_however_early_and_far(seed, reach, early):
+    rng = np.random.default_rng(seed)
+    rows = crowds.as_table(crowds.singles(rng, 500, 900))
+    sound = check(crowds.read(rows, rng))
+    assert not sound.loses_people, str(sound)
+    lost = check(crowds.read(crowds.merging(rows, rng, reach, early), rng))
+    # opposite people come nearer by up to 3.2 m/s
+    assert reach <= lost.resolved <= reach + 3.2 * (early + 0.7), str(lost)
+
+
+def test_tracks_that_break_anywhere_are_no_lost_people():
+    for seed in range(5):
+        broken = check(crowd_of(seed, "broken"))
+        assert broken.ends > 100 and not broken.loses_people, str(broken)
+
+
 def test_the_description_says_how_many_pairs_and_what_is_lost():
     sound = describe_pairs(crowd_of(2), crowds.AREA).splitlines()
     assert sound[0].startswith(

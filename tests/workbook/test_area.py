@@ -13,10 +13,10 @@ import shapely
 from helpers.track_tables import make_crowd, make_hall, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.days import require_encounters
 from szlib.workbook import folders
 from szlib.workbook.cli import main
 from szlib.workbook.record import NotebookRecord
+from szlib.zones.verdict import require_encounters
 
 HALL = shapely.box(0, 0, 12, 8)
 

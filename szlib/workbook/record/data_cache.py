@@ -34,7 +34,7 @@ from ...encounters.finding import find_place
 from ...encounters.geometry import Area
 from ...tracks import datasets
 from ...zones.social_zone import recorded_hours
-from ...zones.verdict import describe_missing_encounters
+from ...zones.verdict import describe_missing_encounters, require_encounters
 from .parameters import ZoneMethod
 
 # time-shifted copies of the data that lone encounters are compared with (assumed)
@@ -132,7 +132,7 @@ class DataCache:
 
         Raises DataError, which names the condition that rejected the last rows, if there are none.
         """
-        days.require_encounters(samples)
+        require_encounters(samples)
         content = io.BytesIO()
         samples.to_parquet(content)
         store_cached(

@@ -192,13 +192,24 @@ def near_pairs(
 
 
 def merging(
-    rows: pd.DataFrame, rng: np.random.Generator, reach: float = 0.45
+    rows: pd.DataFrame,
+    rng: np.random.Generator,
+    reach: float = 0.45,
+    early: float = 0.0,
 ) -> pd.DataFrame:
-    """A tracker that loses one of two people nearer than `reach` [m], and gives a new id after that."""
+    """A tracker that loses one of two people nearer than `reach` [m], and gives a new id after that.
+
+    The one is lost `early` [s] before, and found as long after.
+    """
     one, other, _ = near_pairs(rows, reach)
     lost = np.zeros(len(rows), bool)
     lost[np.where(rng.random(len(one)) < 0.5, one, other)] = True
     lost[np.maximum(one, other)] = True  # always the same one of a pair
+    if early:
+        key = rows["id"].to_numpy() * 1e6 + rows["tick"].to_numpy()
+        steps = round(early / _DT)
+        around = key[lost][:, None] + np.arange(-steps, steps + 1)
+        lost = np.isin(key, around)
     return _new_ids(
         rows.assign(gone=lost).sort_values(["id", "tick"], ignore_index=True)
     )
