@@ -24,6 +24,7 @@ from .settings import TOLERANCE, MPCSettings
 ROUNDING = 1e-7
 PIECES = 16  # of a step, at whose ends gaps are computed
 _SAMPLES = PIECES + 1
+_MOST_PIECES = 64  # in which braking is looked at
 # A robot that moves less than this for a step is never faster than 1 mm/s within it: it rests [m/s].
 AT_REST = 2.5e-4
 
@@ -191,16 +192,16 @@ def verify_step(step: Any) -> Report:
 def _sample(state: Array, inputs: Array, lasts: Array, rests_by: Any = None) -> Sampled:
     """The way of a double integrator that holds each of the `inputs` for its time (paper, eq. 8).
 
-    Then it brakes as hard as it can, with the settings `rests_by`.
+    Then it brakes as hard as it can, with the settings `rests_by`, in steps of dt (two wheels follow each).
     """
     if rests_by:
         v = state[2:] + lasts @ inputs
-        dt = rests_by.dt
         stop = np.abs(v).max() / rests_by.a_max
-        n = min(int(np.ceil(stop / dt - ROUNDING)), _SAMPLES)
-        stop = max(dt, stop)
-        inputs = np.concatenate([inputs, np.tile(-v / stop, (n, 1))])
-        lasts = np.append(lasts, np.full(n, stop / max(1, n)))
+        piece = rests_by.dt * max(1, np.ceil(stop / rests_by.dt / _MOST_PIECES))
+        left = np.append(np.arange(stop, 0, -piece), 0.0)
+        braking = np.diff(left)[:, None] * v / (piece * stop or 1.0)
+        inputs = np.concatenate([inputs, braking])
+        lasts = np.append(lasts, np.full(len(braking), piece))
     points = [state[None, :2]]
     times = [np.zeros(1)]
     states = [state]

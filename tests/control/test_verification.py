@@ -17,6 +17,7 @@ from studies.distances import euclidean_to_ellipse, euclidean_to_segment
 
 import szlib
 from szlib.control import HalfPlane, Wall, verification
+from szlib.control.controller import find_stopping_path
 from szlib.control.obstacles import Obstacles
 
 coordinate = st.floats(-3, 3, allow_subnormal=False)
@@ -343,3 +344,18 @@ def test_explain_describes_the_step_in_sentences():
         "cannot be reached"
         in controller.step((-4, 0, 0, 0), (0.3, 0), [FACING]).explain()
     )
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.05, 0.2, 0.4])
+def test_braking_is_checked_in_the_steps_in_which_the_robot_brakes(dt):
+    """Two wheels follow a point from step to step, so that other steps are another way of the disc."""
+    s = szlib.MPCSettings(dt=dt)
+    rng = np.random.default_rng(0)
+    for state in [np.zeros(4), *rng.uniform(-1, 1, (20, 4))]:
+        control = rng.uniform(-1, 1, 2)
+        path = find_stopping_path(state, control, s)
+        way = verification._sample(state, control[None], np.array([dt]), s)
+        n = verification.PIECES
+        assert way.times[::n] == pytest.approx(path.times)
+        assert way.points[::n] == pytest.approx(path.points)
+        assert way.states[-1, 2:] == pytest.approx(0.0, abs=1e-12)
