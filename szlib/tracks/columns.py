@@ -322,12 +322,14 @@ def to_numbers(values: Series, decimal: str = ".") -> Series:
 def to_times(
     values: Series, tz: str, unit: str | None = None, decimal: str = "."
 ) -> tuple[Series, Series | None]:
-    """The times in a column of `values`: numbers (`decimal` is their point), dates, ISO texts.
+    """The times in a column of `values`: numbers (`decimal` is their point), dates, durations, ISO texts.
 
     Numbers are in a `unit` of time; None takes seconds, or a shorter unit for counts since 1970.  Times
     without a zone are those of `tz`.  Returns seconds, since 1970 where times are dates; and the local date
     of each where the column states its zone, else None.
     """
+    if values.dtype == pl.Duration:
+        return values.dt.total_nanoseconds() / 1e9, None
     numbers = to_numbers(values, decimal)
     day = None
     if values.dtype == String and 2 * numbers.null_count() > len(values):

@@ -6,6 +6,7 @@ A file that cannot be used raises a DataError that names the file and the line.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 import polars as pl
-from polars import Expr, Series, String, col, exceptions, lit
+from polars import Series, String, col, exceptions, lit
 
 from ..core.errors import DataError, warn
 from ..core.input_files import explain_errors, printable
@@ -39,12 +40,16 @@ MOST_DOUBLED = 0.2
 """Share of rows up to which a person may have a second place at one time (assumed)."""
 # A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
 CALENDAR_BEGINS = 1e8
+_GLITCHES = 0.01  # share of times that may be wrong
 _HEAD = 1 << 16  # bytes of a text by which its day is found
 
 # A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
 # distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
 _FASTEST = 5.0
 _BLUR = 0.5
+_MOST_SHARED = (
+    0.5  # share of (id, x, y), to 1 cm, that two recordings may have in common
+)
 _SOON = 5.0
 
 Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
@@ -68,11 +73,6 @@ class LoadedFile(NamedTuple):
     rows: pl.DataFrame
     is_named: bool
     stage: dict[str, Any]
-
-    def with_day(self, day: str | Expr) -> LoadedFile:
-        """The same rows under another `day`."""
-        day = lit(day) if isinstance(day, str) else day
-        return self._replace(rows=self.rows.with_columns(day=day))
 
 
 def read_raw(
@@ -137,7 +137,7 @@ def merge_files(
 
     Days `excluded` are left out, and rows that `select` leaves out.
     """
-    parts = [file.rows for file in files]
+    parts = (file.rows for file in files)
     merged = wanted = pl.concat(parts, how="vertical_relaxed")
     if excluded:
         wanted = merged.filter(~col.day.cast(String).is_in(excluded))
@@ -175,8 +175,11 @@ def merge_files(
         warn(f"{names}: {text}")
         name = f"{funnels.WARNING}{text}"
         stages.append(funnels.stage(name, merged.height, merged.height, {}))
-    far = {"never near the area": wanted.height - near.height}
-    reasons = {"excluded day": merged.height - wanted.height, **far, **doubled}
+    reasons = {
+        "excluded day": merged.height - wanted.height,
+        "never near the area": wanted.height - near.height,
+        **doubled,
+    }
     stages.append(funnels.stage("merge files", merged.height, rows.height, reasons))
     return funnels.attach(frame, stages)
 
@@ -318,7 +321,7 @@ def find_day(path: Path, recipe: Recipe) -> str | None:
 
 def local_dates(t: Series, recipe: Recipe) -> Series | None:
     """The date of each time `t` in the time zone of the `recipe`; None where there is no calendar."""
-    if recipe.shape.is_sequence or not (t >= CALENDAR_BEGINS).any():
+    if recipe.shape.is_sequence or (t.quantile(_GLITCHES) or 0) < CALENDAR_BEGINS:
         return None
 
     def dates(times: Series) -> Series:
@@ -340,19 +343,25 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
 
     Files without a calendar are recordings of their own, called by their names.  Files of a calendar day are
     its pieces.  Raises DataError where somebody in two of them is in two places at once, or two recordings
-    have the same name or the same rows.
+    have the same name, or the same rows, to 1 cm.
     """
     names = name_recordings([file.path for file in files])
     pairs = [*zip(files, names, strict=True)]
     check_names([name for file, name in pairs if file.is_named])
     known = dict[int, str]()
     for file, name in pairs:
-        first = known.setdefault(file.rows.drop("day").hash_rows().sum(), name)
+        content = file.rows.select("id", "t", col("x", "y").round(2)).hash_rows().sum()
+        first = known.setdefault(content, name)
         if file.is_named and first != name:
             raise DataError(
                 f"{first} and {name} hold the same rows; pass each recording once"
             )
-    named = [file.with_day(name) if file.is_named else file for file, name in pairs]
+    named = [
+        file._replace(rows=file.rows.with_columns(day=lit(name)))
+        if file.is_named
+        else file
+        for file, name in pairs
+    ]
     rows = pl.concat(
         f.rows.select(col.day.cast(String), "id", "t", "x", "y", file=k)
         for k, f in enumerate(named)
@@ -383,7 +392,7 @@ def name_recordings(files: Sequence[Path]) -> list[str]:
 
 def file_stem(path: Path) -> str:
     """The name of file `path` without its endings."""
-    return path.name.split(".")[0]
+    return re.sub(r"(?<=.)(\.[a-zA-Z]\w*)+$", "", path.name)
 
 
 def check_names(names: Sequence[str]) -> None:

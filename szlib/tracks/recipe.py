@@ -248,7 +248,7 @@ def find_recipe(
     """The `recipe` with `parameters` in place of its own; without one, that beside the first of `files`."""
     if recipe is None:
         paths = [Path(each) for each in files[:1] if isinstance(each, str | Path)]
-        saved = [path.with_name(FILE_NAME) for path in paths]
+        saved = [path.parent / FILE_NAME for path in paths]
         recipe = Recipe()
         for path in filter(Path.is_file, saved):
             recipe = Recipe.load(path)

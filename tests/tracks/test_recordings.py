@@ -182,3 +182,30 @@ def test_files_too_large_for_memory_are_refused_before_reading(tmp_path: Path) -
         pytest.raises(MemoryLimitError, match=r"the clock: 1,180 ticks of 240 rows"),
     ):
         szlib.tracks.clock.to_clock(raw)
+
+
+def test_files_are_named_with_dots_but_without_their_endings(tmp_path: Path) -> None:
+    files = [
+        write(tmp_path / name, recording(x))
+        for name, x in (("2024.01.15.csv", 0.0), ("2024.01.16.csv", 9.0))
+    ]
+    packed = tmp_path / "hall.csv.gz"
+    packed.write_bytes(gzip.compress(recording(20.0).to_csv(index=False).encode()))
+    days = set(szlib.read_tracks([*files, packed])["day"])
+    assert days == {"2024.01.15", "2024.01.16", "hall"}
+
+
+def test_durations_are_seconds_and_counts_of_microseconds_no_calendar() -> None:
+    rows = recording(0.0)
+    spans = rows.assign(t=pd.to_timedelta(rows["t"], unit="s"))
+    tracks, expected = szlib.read_tracks(spans), szlib.read_tracks(rows)
+    pd.testing.assert_frame_equal(tracks, expected)
+    counts = recording(0.0, seconds=300).assign(t=lambda table: 1e6 * table["t"])
+    with pytest.warns(szlib.DataWarning, match="nobody walks"):
+        assert set(szlib.read_tracks(counts, max_gap=1e6)["day"]) == {"table-1"}
+
+
+@pytest.mark.parametrize("path", [".", "/"])
+def test_a_folder_without_a_name_is_refused_as_a_folder(path: str) -> None:
+    with pytest.raises(szlib.DataError, match="is a folder; pass the files in it"):
+        szlib.read_tracks(path)
