@@ -202,7 +202,7 @@ def test_durations_are_seconds_and_counts_of_microseconds_no_calendar() -> None:
     pd.testing.assert_frame_equal(tracks, expected)
     counts = recording(0.0, seconds=300).assign(t=lambda table: 1e6 * table["t"])
     with pytest.warns(szlib.DataWarning, match="nobody walks"):
-        assert set(szlib.read_tracks(counts, max_gap=1e6)["day"]) == {"table-1"}
+        assert set(read_raw(counts)["day"]) == {"table-1"}
 
 
 @pytest.mark.parametrize("path", [".", "/"])
