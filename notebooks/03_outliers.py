@@ -165,11 +165,11 @@ fig, axs = plt.subplots(2, 1, figsize=(9, 3), layout="constrained", sharex=True)
 for ax, each in zip(axs, (five, seven), strict=True):
     factors = lof(each, 2)
     ax.scatter(each, 0 * each, s=60 * factors, color=np.where(factors > 2, figures.RED, figures.BLUE))
-    for at, factor in zip(each[:, 0], factors, strict=True):
-        if at <= 10:
-            ax.annotate(f"{factor:.2g}", (at, 0), (0, 14), textcoords="offset points", ha="center")
+    for at in (0, 1, 2, 3, 10):  # the friends stand beside the last one
+        shown = ", ".join(f"{factor:.2g}" for factor in factors[np.floor(each[:, 0]) == at])
+        ax.annotate(shown, (at, 0), (0, 14), textcoords="offset points", ha="center")
     ax.set(yticks=[], ylim=(-1, 1.6))
-axs[0].set_title("Alone at 10 m: LOF 5. With two friends: 0.9")
+axs[0].set_title("Alone at 10 m: LOF 5. With two friends: about 1")
 axs[1].set_xlabel("position [m] (above each point: its LOF)")
 record.figure(fig, "five")
 

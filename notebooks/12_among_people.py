@@ -442,7 +442,7 @@ Markdown(
     f"<details><summary>Answer</summary>\n\nThe paper's robot backs away as fast as the people come, {backs:.0f} m, and "
     f"would go on. The other two pass between two people, in {usual['time_to_goal']:.1f} s and "
     f"{through['time_to_goal']:.1f} s. They enter a zone for {among.dt * entered:.1f} s and "
-    f"{among.dt * through['violations']:.1f} s, keep {wide:.2f} m from the nearest body, and report these steps as "
+    f"{among.dt * through['violations']:.1f} s, keep {wide:.2f} m or more from the nearest body, and report these steps as "
     f"not safe. Their search pays {ways.ZONE_SECOND:g} s for a second in a zone, and a plan that begins along this way "
     "finds the gap.\n\n</details>"
 )
@@ -460,10 +460,11 @@ display(movie)
 # (Nocedal & Wright, *Numerical Optimization*, ch. 17). The prices of `among_people()` are 10 for a metre of decay and 200 for a
 # metre within a zone, each for 0.1 s: the robot enters a zone where waiting would cost more.
 #
-# **Why not a high price for walls?** Because prices are added up. Two people come along a wall. To give both 0.3 m more, the
-# robot would have to drive 0.5 m into the wall. If a metre has one price, that saves $2 \cdot 0.3 = 0.6$ m and costs 0.5 m: the
-# robot drives into the wall. A price that is high enough for two people is too low for ten. With priorities the number of
-# people does not matter. Notebook [21](deeper/21_feasibility.ipynb) shows such a wall.
+# **Why not a high price for walls?** Because prices are added up. The robot drives beside a wall, and two people come
+# towards it. Say that it can keep 0.3 m more from each of them, if it moves 0.5 m into the wall. If a metre has one price,
+# that saves $2 \cdot 0.3 = 0.6$ m and costs 0.5 m: the robot drives into the wall. A price that is high enough for two
+# people is too low for ten. With priorities the number of people does not matter. Notebook
+# [21](deeper/21_feasibility.ipynb) shows such a wall.
 
 # %% [markdown]
 # ## Among 200 recorded people
@@ -493,6 +494,10 @@ shown.rename_axis(None).rename_axis(None, axis=1).style.format("{:.2f}").format(
 # The *social force* is a controller without barriers: people push the robot away, and its goal attracts it. It arrives
 # about as often as `among_people()`, and is in zones for much longer. The last row is what the recorded people did
 # themselves: their time is not quite 1, because a way ends where its goal is 0.5 m away.
+#
+# szlib's defaults look for no way. They never *drive* into a zone; but they wait where people walk, and the recorded
+# people, who do not see the robot, take their zones to it. So they are in zones for longer than `among_people()`, which is
+# out of the way in time.
 
 # %% [markdown]
 # ## What the robot is bad at
@@ -526,7 +531,7 @@ ax.axhline(0, color=figures.RED, linewidth=1)
 ax.axvline(1, color=figures.GREY, linestyle=":", label="top speed of the robot")
 ax.set(xlabel="pace of the person who comes from behind [m/s]", ylabel="least gap to the body [m]")
 at = overtaken[overtaken["robot"] == "paper"].set_index("pace")["gap"]
-runs_into = f"at {at.index[at < 0].min():g} m/s or more the paper's robot is run into"
+runs_into = f"at {at.index[at < 0].min():g} m/s the paper's robot is run into"
 ax.set_title("Overtaken from behind: " + (runs_into if at.min() < 0 else "nobody is touched"))
 ax.legend()
 record.figure(fig, "overtaken")
@@ -670,7 +675,7 @@ Markdown(
     f"h < 0 for {within['among people']:.1f} s, and each of these steps was flagged. A map leads out of dead "
     "ends, a way through space and time leads around people, and a price on eq. 1 leads through crowds: "
     "in the place of 200 recorded people the goal was reached in "
-    f"{means.loc['among people', 'reached']:.1%} of the ways, with szlib's defaults in {means.loc['MPC-CBF', 'reached']:.0%}. The robot "
+    f"{means.loc['among people', 'reached']:.1%} of the ways, with szlib's defaults in {means.loc['MPC-CBF', 'reached']:.1%}. The robot "
     "performs poorly around people who are faster than itself and do not see it, and it never arrives at a goal "
     "amid a standing group. Notebook 29 has people who react, and all the tables. In "
     "chapter 13 you try such scenes yourself."

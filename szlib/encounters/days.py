@@ -212,7 +212,8 @@ class Extraction:
                 )
         if not sources:
             raise DataError(
-                f"{folder}: no day is left; expected one besides those excluded, {sorted(excluded)}"
+                f"{folder}: no day is left; expected one besides those excluded, {sorted(excluded)}, and "
+                "those that failed: `szlib extract` says why"
             )
         table = pd.DataFrame({"day": list(sources), "status": "kept"})
         return cls(folder, table, settings, recipe, sources, excluded)

@@ -7,8 +7,8 @@ In the meetings people walk at about 0.5 m/s and do not react; without people th
 start to goal; two who pass have just enough space for a zone of 1.0 x 0.7 m.
 
 >>> import szlib
->>> list(szlib.SCENARIOS)
-['passing', 'corridor', 'waiting', 'making_room']
+>>> szlib.SCENARIOS["passing"].title
+'Passing a stationary person'
 >>> szlib.MEETINGS["overtaking"].title
 'A person walks ahead, at 0.3 m/s'
 

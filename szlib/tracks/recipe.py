@@ -253,9 +253,7 @@ def find_recipe(
         for path in filter(Path.is_file, saved):
             recipe = Recipe.load(path)
             how = arguments(recipe.as_json())
-            warn(
-                f"the settings in {path} are used: {how:.120} ...; delete it if they are wrong"
-            )
+            warn(f"the settings in {path} are used: {how}; delete it if they are wrong")
     given = {name: value for name, value in parameters.items() if value is not None}
     return Recipe(**given).over(recipe)
 

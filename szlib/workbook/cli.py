@@ -246,6 +246,9 @@ def _inspect(options: argparse.Namespace) -> int:
     settings = EncounterSettings(area=options.area, has_walls=options.walls)
     description, found = describe_file(files[0], reading)
     print(description)
+    file = options.save or files[0].with_name(FILE_NAME)
+    if options.save is not None:
+        found.save(file)  # without an area, which may not be found
     # The funnel shows the same counts.
     with warnings.catch_warnings(action="ignore", category=DataWarning):
         loaded = load_files(files, reading)
@@ -260,11 +263,10 @@ def _inspect(options: argparse.Namespace) -> int:
     print(describe_pairs(tracks, area))
     command = f"{os.environ.get(COMMAND_VARIABLE, 'the same command')} --save"
     if options.save is not None:
-        found = replace(found, area=str(area))
-        file = found.save(options.save or files[0].with_name(FILE_NAME))
+        replace(found, area=str(area)).save(file)
         print("recipe saved:", printable(file))
         words = ["--recipe", options.save] if options.save else []
-        words += ["--walls"] if options.walls else []
+        words += options.walls * ["--walls"]
         command = shlex.join(["szlib", "fit", options.file, *words])
     print("go on with:", command)
     return 0

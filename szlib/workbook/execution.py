@@ -7,6 +7,7 @@ of CPU time for each notebook.
 from __future__ import annotations
 
 import asyncio
+import atexit
 import logging
 import os
 import sys
@@ -104,7 +105,7 @@ def run_cells(
     folder: Path,
     environment: Mapping[str, str],
 ) -> None:
-    """Run the cells of a notebook, and write the executed copy also if a cell fails.
+    """Run the cells of a notebook, and write the executed copy, also if a cell fails.
 
     `script`, `parameters`, `folder` and `environment` are those of `execute_notebook`.
     Raises the error of nbclient for a cell that fails, or for a kernel that ends.
@@ -140,14 +141,17 @@ def run_cells(
             f"--InteractiveShellApp.exec_lines={add}",
         ],
     )
-    own = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1"}
+    kernel = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1", **environment}
     failure = None
     try:
-        run = client.async_execute(env={**os.environ, **own, **environment})
+        run = client.async_execute(env=os.environ | kernel)
         with ThreadPoolExecutor(1) as thread:  # an event loop may run in this one
             thread.submit(asyncio.run, run).result()
     except CellExecutionError as error:
         failure = error
+    finally:
+        # after Ctrl-C it would fail at exit; the kernel ends by itself
+        atexit.unregister(client._cleanup_kernel)
     write_file(folder / f"{script.stem}.ipynb", nbformat.writes(notebook))
     if failure:
         raise failure

@@ -289,16 +289,6 @@ class Outcome:
     side_changes: int
     step_times: Any
 
-    @property
-    def step_median(self) -> float:
-        """Median time of a step [s]."""
-        return float(np.median(self.step_times))
-
-    @property
-    def step_p999(self) -> float:
-        """Time that one step in a thousand exceeds [s]."""
-        return float(np.quantile(self.step_times, 0.999))
-
 
 def make_controller(walls: Any) -> szlib.MPCCBF:
     """The controller that a robot of .3 m runs among people."""

@@ -52,13 +52,6 @@ def make_controller(walls, zone):
     return szlib.MPCCBF(zone, walls=walls, settings=settings)
 """
 
-JUNK = """
-import contextlib, os
-for i in range(3, 20):
-    with contextlib.suppress(OSError):
-        os.write(i, b"5\\n")
-"""
-
 
 @pytest.fixture
 def run():

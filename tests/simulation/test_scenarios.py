@@ -37,11 +37,14 @@ def logs():
     return {name: run(scenario) for name, scenario in szlib.SCENARIOS.items()}
 
 
-def test_scenarios_have_claims_and_titles():
+def test_scenarios_have_titles_and_those_of_the_paper_its_claims():
     for scenario in szlib.SCENARIOS.values():
         assert scenario.walls.shape[1:] == (2, 2) and scenario.start.shape == (4,)
+        assert scenario.title
+    for name in ("passing", "corridor", "waiting", "making_room"):
+        scenario = szlib.SCENARIOS[name]
         assert all(np.hypot(*p.velocity) in (0, 0.5) for p in scenario.people)
-        assert scenario.claims and scenario.title
+        assert scenario.claims
 
 
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
