@@ -244,7 +244,7 @@ record.check(
 #   numbers, people who swerve around a known circle seem to keep a smaller one.
 #
 # Beyond 1.2 m the figure takes reactions to be small: it scales the counts by chance to agree with the data there. So
-# they are not those of the table above. Ratios above 3 are not drawn.
+# they are not those of the table above.
 #
 # **What do you think?** Will the ratio be 0 close to the person?
 
@@ -257,11 +257,13 @@ beyond = {
 scale = {k: (seen.loc[seen["kind"] == k, "nearest"] > 1.2).sum() / n for k, n in beyond.items()}
 expected, _ = np.histogram(chance["nearest"], bins, weights=chance["kind"].map(scale).astype(float))
 counted, _ = np.histogram(seen["nearest"], bins)
-is_known = (expected >= 1) & (counted <= 3 * expected)
+is_known = expected >= 1
 ratio, middle = counted[is_known] / expected[is_known], (bins[:-1] + 0.05)[is_known]
 error = np.sqrt(np.maximum(counted[is_known], 1)) / expected[is_known]
 fig, ax = plt.subplots(figsize=(8, 3.8), layout="constrained")
-ax.errorbar(middle, ratio, error, fmt="o", color=figures.BLUE, capsize=3, label="seen / by chance")
+is_low, looks = ratio <= 3, {"color": figures.BLUE}
+ax.errorbar(middle[is_low], ratio[is_low], error[is_low], fmt="o", capsize=3, label="seen / by chance", **looks)
+ax.plot(middle[~is_low], np.full_like(middle[~is_low], 2.9), "^", label="the same, above 3", **looks)
 ax.axhline(1, color=figures.BLACK, linestyle=":", label="no interaction")
 ax.axvspan(respected.low, respected.high, color=figures.RED, alpha=0.25, linewidth=0, label="95 % interval")
 ax.axvline(respected.radius, color=figures.RED, label=f"R = {respected.radius:.2f} m")

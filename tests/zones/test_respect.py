@@ -59,10 +59,9 @@ def random_parameters(seed):
 # --- truth -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [3, 5])
-def test_every_pair_on_the_plaza_gives_its_zone(seed, tmp_path):
+def test_every_pair_on_the_plaza_gives_its_zone(tmp_path):
     """Nearly all of its people pass just outside of a zone, where chance has hardly anybody."""
-    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=seed))
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=3))
     against = szlib.null_pairs(tracks, shifts=19, progress=False)
     m, n, a, b, _ = fitted(szlib.find_pairs(tracks), against)
     true = szlib.PlazaSettings().true_zone(1.1)
@@ -90,7 +89,7 @@ def test_an_imposed_zone_is_found(zone, careless, large_null):
 def test_the_zone_grows_with_speed_if_people_do_so(
     large_null,
 ):
-    samples = passing_pairs(4000, 7)
+    samples = passing_pairs(2500, 7)
     larger = 0.4 + 0.4 * samples[["speed", "other_speed"]].max(axis=1)
     of_all, of_fast = (
         samples["encounter"][samples["distance"] < r].unique() for r in (0.84, larger)
