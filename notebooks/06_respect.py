@@ -263,7 +263,7 @@ error = np.sqrt(np.maximum(counted[is_known], 1)) / expected[is_known]
 fig, ax = plt.subplots(figsize=(8, 3.8), layout="constrained")
 is_low, looks = ratio <= 3, {"color": figures.BLUE}
 ax.errorbar(middle[is_low], ratio[is_low], error[is_low], fmt="o", capsize=3, label="seen / by chance", **looks)
-ax.plot(middle[~is_low], np.full_like(middle[~is_low], 2.9), "^", label="the same, above 3", **looks)
+ax.plot(middle[~is_low], np.full_like(middle[~is_low], 2.9), "^", label="seen / by chance, above 3", **looks)
 ax.axhline(1, color=figures.BLACK, linestyle=":", label="no interaction")
 ax.axvspan(respected.low, respected.high, color=figures.RED, alpha=0.25, linewidth=0, label="95 % interval")
 ax.axvline(respected.radius, color=figures.RED, label=f"R = {respected.radius:.2f} m")

@@ -367,16 +367,17 @@ class Tracker:
         """
         now = check_finite("now", now)
         self._set_clock(now)
+        listed: Any = people
         try:
             if not isinstance(people, (list, tuple)):
-                people = np.ma.filled(np.asanyarray(people, float), np.nan).tolist()
-            names = [getattr(each, "id", None) for each in people]
+                listed = np.ma.filled(np.asanyarray(people, float), np.nan).tolist()
+            names = [getattr(each, "id", None) for each in listed]
             names = names if ids is None else list(ids)
             given = Counter(names)
-            times = [now] * len(people)
+            times = [now] * len(listed)
             if stamps is not None:
-                times = np.full(len(people), stamps, float).tolist()
-            rows = zip(people, names, times, strict=True)
+                times = np.full(len(listed), stamps, float).tolist()
+            rows = zip(listed, names, times, strict=True)
             measured = [(*self._read(each, name), name, t) for each, name, t in rows]
         except (TypeError, ValueError, OverflowError) as error:
             raise SolverError(

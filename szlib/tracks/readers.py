@@ -348,7 +348,7 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     names = name_recordings([file.path for file in files])
     pairs = [*zip(files, names, strict=True)]
     check_names([name for file, name in pairs if file.is_named])
-    known = dict[int, str]()
+    known = dict[Any, str]()
     for file, name in pairs:
         content = file.rows.select("id", "t", col("x", "y").round(2)).hash_rows().sum()
         first = known.setdefault(content, name)
