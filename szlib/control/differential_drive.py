@@ -56,10 +56,11 @@ from ..core.checks import Array, check_array, check_number, check_vector, requir
 from ..core.errors import SolverError
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
-from .obstacles import Path, Point
+from .obstacles import Path, Point, find_bodies
 from .people import SpeedZone
-from .settings import MPCSettings
-from .step import Scene, Step
+from .planner import Plan
+from .settings import TOLERANCE, MPCSettings
+from .step import Scene, Status, Step
 from .verification import PIECES, Sampled
 from .ways import Heading
 
@@ -315,6 +316,30 @@ class DifferentialDrive(MPCCBF):
             velocity = [true.real, true.imag]
         point = [x + here.real, y + here.imag, *velocity]
         return point, (gx + there.real, gy + there.imag)
+
+    def _choose(
+        self, scene: Scene, heading: Heading
+    ) -> tuple[Status, Plan, tuple[bool, bool]]:
+        """As of `MPCCBF`; but a robot that overlaps a body may leave it on a straight line, not brake.
+
+        Its disc cannot follow every plan away from a body: it would move towards it first.
+        """
+        found = super()._choose(scene, heading)
+        status, plan, (walls_safe, passively_safe) = found
+        rests = not plan.inputs.any()
+        is_held = status == "braking" and walls_safe and (rests or not passively_safe)
+        x, y, theta, *_ = self._own.tolist()
+        bodies = find_bodies(scene.zones, self.settings)
+        if not is_held or bodies.gaps(x, y).min(initial=0.0) >= -TOLERANCE:
+            return found
+        ahead = self._s.a_max * np.array([cos(theta), sin(theta)])
+        for first in (-ahead, ahead):
+            leaves = plan._replace(inputs=np.vstack([first, plan.inputs[1:]]))
+            brakes, is_safe = self._guard(scene, leaves)
+            if not brakes and all(is_safe):
+                self._plan = leaves.inputs
+                return "restarted", leaves, is_safe
+        return found
 
     def _finish(self, **found: Any) -> DriveStep:
         """The command with which the wheels follow the point."""

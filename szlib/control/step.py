@@ -130,8 +130,9 @@ class Step:
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     inputs : accelerations of the plan, shape (N, 2) [m/s2].
     status : "optimal": the plan satisfies every row without a price. "relaxed": it violates the least, by
-        priorities. "restarted": the same, found from full braking instead of from the last plan. "braking":
-        full braking, because it is safer than the plan, or there is none.
+        priorities. "restarted": the same, found from full braking instead of from the last plan; or two
+        wheels leave a body that they overlap, on a straight line. "braking": full braking, because it is
+        safer than the plan, or there is none.
     walls_safe : True if the robot, which holds the control for dt and then brakes as hard as it can, touches
         nothing fixed. A robot that was walls_safe once stays so, whatever people do: see `szlib.control.mpc`.
     passively_safe : True if, besides, it overlaps no body while it moves, if people keep their velocity: if
@@ -222,7 +223,7 @@ class Step:
         """Barriers in the state itself, shape (obstacles,) [m].
 
         Where one is negative, the robot already is where it should not be, and the plan leads out
-        again; a robot that overlaps a body rests instead, if it cannot leave without moving towards it.
+        again.
         """
         return self.scene.barriers.h(*self.scene.state[:2])
 
@@ -398,7 +399,7 @@ class Step:
     def _advise(self, row: Row) -> str:
         s = self.scene.settings
         if (self.h < -TOLERANCE).any():
-            return "nothing now, because the robot is already too close; it leaves as it can"
+            return "nothing now, because the robot is already too close; the plan leads out again"
         if row.kind == "speed":
             return f"start at v_max = {s.v_max:g} m/s or slower, or raise v_max"
         if row.kind == "end":

@@ -565,3 +565,25 @@ def test_forged_claims_of_the_guard_are_faults_of_a_drive_step():
     assert not met.passively_safe and met.verify().ok
     lie = replace(met, passively_safe=True)
     assert any("does not" in fault for fault in lie.verify().faults)
+
+
+@pytest.mark.parametrize("omega_max", [2.0, 4.0])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_robot_leaves_a_person_whom_it_overlaps_without_moving_towards_them(
+    seed, omega_max
+):
+    rng = np.random.default_rng(seed)
+    settings = szlib.MPCSettings.among_people(r_robot=0.3, v_max=0.8)
+    drive = szlib.DifferentialDrive(ZONE, settings=settings, omega_max=omega_max)
+    contact = settings.r_robot + BODY_RADIUS
+    away, angle = rng.uniform(0.2, contact - 0.02), rng.uniform(-np.pi, np.pi)
+    person = szlib.Person((away * np.cos(angle), away * np.sin(angle)))
+    own = np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi), 0.0, 0.0])
+    gaps = [away - contact]
+    for _ in range(200):
+        step = drive.step(own, GOAL, [person])
+        assert step.verify().ok
+        own = drive.robot.advance(own, step.control, settings.dt)
+        gaps.append(np.hypot(*(own[:2] - person.position)) - contact)
+    overlap = np.minimum(gaps, 0.0)
+    assert overlap[-1] == 0.0 and np.diff(overlap).min() > -1e-3
