@@ -262,7 +262,9 @@ ratio, middle = counted[is_known] / expected[is_known], (bins[:-1] + 0.05)[is_kn
 error = np.sqrt(np.maximum(counted[is_known], 1)) / expected[is_known]
 fig, ax = plt.subplots(figsize=(8, 3.8), layout="constrained")
 is_low, looks = ratio <= 3, {"color": figures.BLUE}
-ax.errorbar(middle[is_low], ratio[is_low], error[is_low], fmt="o", capsize=3, label="seen / by chance", **looks)
+ax.errorbar(
+    middle[is_low], ratio[is_low], error[is_low], fmt="o", capsize=3, label="seen / by chance", **looks
+)
 ax.plot(middle[~is_low], np.full_like(middle[~is_low], 2.9), "^", label="seen / by chance, above 3", **looks)
 ax.axhline(1, color=figures.BLACK, linestyle=":", label="no interaction")
 ax.axvspan(respected.low, respected.high, color=figures.RED, alpha=0.25, linewidth=0, label="95 % interval")
@@ -284,14 +286,13 @@ if is_plaza:
     staged = (
         f" People mostly pass at the side, where the true zone reaches {side:.2f} m at {zone_speed:g} m/s. Just outside "
         "of it the ratio is far above 1, because the plaza makes most pairs pass there. Close to the person chance has "
-        "hardly anybody: there the 2 % of the plaza who are careless make a ratio that is not small."
+        "hardly anybody, and the 2 % who are careless show."
     )
     if not respected.low <= side <= respected.high:
-        staged += " The interval does not hold the truth: the plaza is not made as the model says."
-careless, most = 100 * respected.careless, 100 * respected.careless_high
+        staged += " The interval misses it: the plaza is not made as the model says."
 Markdown(
     "<details><summary>Answer</summary>\n\nNot where some people are careless. Here they are "
-    f"{careless:.1f} % of the encounters (at most {most:.1f} %). The library finds the numbers that explain all "
+    f"{respected.careless:.1%} of the encounters (at most {respected.careless_high:.1%}). The library finds the numbers that explain all "
     "nearest approaches best. The interval of $R$ holds every radius that explains them nearly as well: "
     f"{respected.low:.2f} to {respected.high:.2f} m.{staged}\n\n</details>"
 )
@@ -476,9 +477,9 @@ record.figure(fig, "n-curve")
 # <details><summary>Answer</summary>
 #
 # The hull, and the radius in the null model. The hull shrinks as people are added, because the nearest of more people is
-# nearer. In the null model the mean radius goes to 0, as it should: few encounters may show any radius by chance. The
-# radius of the respect zone stays, and its band becomes narrower. The last point of each panel is a single draw of all
-# encounters, and one crowd by chance may show any radius: so p decides, not R.
+# nearer. In the null model the mean radius goes to 0, as it should. The radius of the respect zone stays, and its band
+# becomes narrower. The last point of each panel is a single draw of all encounters, and one crowd by chance may show any
+# radius: so p decides, not R.
 #
 # </details>
 
@@ -486,9 +487,8 @@ record.figure(fig, "n-curve")
 # ## Results on real data
 #
 # Strangers on a day in the ATC mall, Osaka, and in 80 minutes at Grand Central, New York (`python -m studies.respect sites`).
-# The tracker of the ATC day loses people who are nearer than 0.9 m to each other. This distance lies in the interval of
-# the radius, so the tracker alone may explain it. Respect still shows if only nearest approaches beyond 0.5 m are
-# compared (p = 0.01).
+# The tracker of the ATC day loses people who are nearer than 0.9 m to each other. This lies in the interval of the radius.
+# Respect still shows if only nearest approaches beyond 0.5 m are compared (p = 0.01).
 
 # %% jupyter={"source_hidden": true}
 # Table
@@ -576,8 +576,7 @@ geometry. Two people who will pass at {collision.CIRCLE} m to the side are never
 number cannot tell a distance from a time.
 
 The other two can. The **nearest approach** is {spread} at Grand Central, at each speed: a zone says how near people *pass*.
-(The radius $R$ above is larger. At $R$ the ratio itself is above 1/2, because it also counts the careless, and those who step
-aside.)
+(The radius $R$ above is larger: at $R$ the ratio is above 1/2, with the careless and those who step aside.)
 The **time to collision** says when they turn: {time.min():.1f} to {time.max():.1f} s before they touch, later than on the
 black line ({least:.1f} s or more), where everybody knows the way beforehand. On the ATC day too few are left to say it:
 there people turn earlier.

@@ -460,9 +460,9 @@ display(movie)
 # (Nocedal & Wright, *Numerical Optimization*, ch. 17). The prices of `among_people()` are 10 for a metre of decay and 200 for a
 # metre within a zone, each for 0.1 s: the robot enters a zone where waiting would cost more.
 #
-# **Why not a high price for walls?** Because prices are added up. The robot drives beside a wall, and two people come
-# towards it. Say that it can keep 0.3 m more from each of them, if it moves 0.5 m into the wall. If a metre has one price,
-# that saves $2 \cdot 0.3 = 0.6$ m and costs 0.5 m: the robot drives into the wall. A price that is high enough for two
+# **Why not a high price for walls?** Because prices are added up. Two people come along a wall. Say that 0.5 m into the
+# wall give each of them 0.3 m more. If a metre has one price, that saves $2 \cdot 0.3 = 0.6$ m and costs 0.5 m: the robot
+# drives into the wall. A price that is high enough for two
 # people is too low for ten. With priorities the number of people does not matter. Notebook
 # [21](deeper/21_feasibility.ipynb) shows such a wall.
 
@@ -495,9 +495,8 @@ shown.rename_axis(None).rename_axis(None, axis=1).style.format("{:.2f}").format(
 # about as often as `among_people()`, and is in zones for much longer. The last row is what the recorded people did
 # themselves: their time is not quite 1, because a way ends where its goal is 0.5 m away.
 #
-# szlib's defaults look for no way. They never *drive* into a zone; but they wait where people walk, and the recorded
-# people, who do not see the robot, take their zones to it. So they are in zones for longer than `among_people()`, which is
-# out of the way in time.
+# szlib's defaults look for no way. They wait where people walk, and people who do not see the robot take their zones to
+# it. So they are in zones for longer than `among_people()`, which is out of the way in time.
 
 # %% [markdown]
 # ## What the robot is bad at

@@ -154,8 +154,8 @@ def drive(
 
     Raises
     ------
-    SolverError : a control is not finite or has another length than `robot.inputs`, `max_time` is not
-        positive, the crowd changes its size, or the controller's dt is not that of `loop.settings`. For an
+    SolverError : a control is not finite or has another length than `robot.inputs`, `max_time` is
+        negative, the crowd changes its size, or the controller's dt is not that of `loop.settings`. For an
         `MPCCBF` also: the goal lies too close to a wall.
 
     Examples
@@ -179,7 +179,7 @@ def drive(
     people = _People(scenario, zone, loop, settings)
     recorder = _Recorder()
     duration = scenario.duration if loop.max_time is None else loop.max_time
-    require(0 < duration < inf, "max_time", duration, "positive", SolverError)
+    require(0 <= duration < inf, "max_time", duration, "at least 0", SolverError)
     arrival: int | None = None
     controller.reset()
     own = robot.start(scenario.start)

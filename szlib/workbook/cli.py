@@ -246,9 +246,6 @@ def _inspect(options: argparse.Namespace) -> int:
     settings = EncounterSettings(area=options.area, has_walls=options.walls)
     description, found = describe_file(files[0], reading)
     print(description)
-    file = options.save or files[0].with_name(FILE_NAME)
-    if options.save is not None:
-        found.save(file)  # without an area, which may not be found
     # The funnel shows the same counts.
     with warnings.catch_warnings(action="ignore", category=DataWarning):
         loaded = load_files(files, reading)
@@ -263,7 +260,8 @@ def _inspect(options: argparse.Namespace) -> int:
     print(describe_pairs(tracks, area))
     command = f"{os.environ.get(COMMAND_VARIABLE, 'the same command')} --save"
     if options.save is not None:
-        replace(found, area=str(area)).save(file)
+        found = replace(found, area=str(area))
+        file = found.save(options.save or files[0].with_name(FILE_NAME))
         print("recipe saved:", printable(file))
         words = ["--recipe", options.save] if options.save else []
         words += options.walls * ["--walls"]

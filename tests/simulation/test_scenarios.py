@@ -37,7 +37,7 @@ def logs():
     return {name: run(scenario) for name, scenario in szlib.SCENARIOS.items()}
 
 
-def test_scenarios_have_titles_and_those_of_the_paper_its_claims():
+def test_scenarios_have_claims_and_titles():
     for scenario in szlib.SCENARIOS.values():
         assert scenario.walls.shape[1:] == (2, 2) and scenario.start.shape == (4,)
         assert scenario.title
