@@ -147,13 +147,13 @@ def draw_map_and_speeds(tracks: pd.DataFrame, area: Area, *, share: float, media
     >>> tracks = pd.DataFrame({"day": "d", "id": 1, "t": t, "x": t - 13, "y": 0 * t, "vx": 1.0, "vy": 0.0})
     >>> figure = plots.draw_map_and_speeds(tracks, szlib.ATC_SQUARE, share=0.5, median=1.0)
     >>> [ax.get_title() for ax in figure.axes[:2]]
-    ['50% of the time people are in the frame', 'People who walk: 1.00 m/s (median)']
+    ['50% of their time people are in the frame', 'People who walk: 1.00 m/s (median)']
     """
     figure, (left, right) = plt.subplots(
         1, 2, figsize=(10.5, 3.1), layout="constrained", width_ratios=(1.6, 1)
     )
     plot_map(tracks, area, ax=left)
-    left.set_title(f"{share:.0%} of the time people are in the frame")
+    left.set_title(f"{share:.0%} of their time people are in the frame")
     left.get_legend().remove()
     speed = np.hypot(tracks["vx"], tracks["vy"])
     hours = np.full(len(speed), 1 / 36_000)  # a sample is 0.1 s
