@@ -59,6 +59,7 @@ from .mpc import MPCCBF
 from .obstacles import Path, Point, find_bodies
 from .people import SpeedZone
 from .planner import Plan
+from .problem import follow_velocities
 from .settings import TOLERANCE, MPCSettings
 from .step import Scene, Status, Step
 from .verification import PIECES, Sampled
@@ -330,14 +331,21 @@ class DifferentialDrive(MPCCBF):
         is_held = status == "braking" and walls_safe and (rests or not passively_safe)
         x, y, theta, *_ = self._own.tolist()
         bodies = find_bodies(scene.zones, self.settings)
-        if not is_held or bodies.gaps(x, y).min(initial=0.0) >= -TOLERANCE:
+        if not is_held or scene.tracked.unknown:
             return found
-        ahead = self._s.a_max * np.array([cos(theta), sin(theta)])
-        for first in (-ahead, ahead):
-            leaves = plan._replace(inputs=np.vstack([first, plan.inputs[1:]]))
+        if bodies.gaps(x, y).min(initial=0.0) >= -TOLERANCE:
+            return found
+        s = self._s
+        targets = np.zeros((s.N, 2))
+        faster = s.a_max * s.dt * np.array([cos(theta), sin(theta)])
+        for change in (-faster, faster):
+            targets[0] = scene.state[2:] + change
+            inputs = follow_velocities(s, scene.state[2:], targets)
+            leaves = plan._replace(inputs=inputs)
             brakes, is_safe = self._guard(scene, leaves)
             if not brakes and all(is_safe):
-                self._plan = leaves.inputs
+                self._plan = inputs
+                self._change = np.zeros_like(inputs)
                 return "restarted", leaves, is_safe
         return found
 

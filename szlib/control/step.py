@@ -27,7 +27,7 @@ HOLDS = 2e-3
 _MEANING: dict[Status, str] = {
     "optimal": "optimal, every row without a price holds",
     "relaxed": "relaxed by priorities: walls, bodies, zones, decay",
-    "restarted": "relaxed by priorities, from full braking",
+    "restarted": "relaxed by priorities, from full braking or straight off a body",
     "braking": "full braking",
 }
 

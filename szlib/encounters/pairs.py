@@ -207,7 +207,11 @@ class Crowd:
         begin = firsts(rows.piece)
         ends = np.stack([begin, np.append(begin[1:], len(rows)) - 1])
         left = (ends[:, rows.piece[at]] - at) / TICKS_PER_SECOND
-        found = count_ends(self.coarse_rows, self.inside[at], left, self.unit)
+        coarse = self.coarse_rows
+        first, period = rows.recorded
+        second = coarse.tick // TICKS_PER_SECOND - first[coarse.day]
+        inside = self.inside[at] & (second > 1) & (second < period[coarse.day] - 2)
+        found = count_ends(coarse, inside, left, self.unit)
         found |= measure_noise(rows, self.inside)
         met = self.meet(CLOSE)
         passing = met.rows[:, (met.kind > _STANDING) & (met.nearest < NEAR_END)]

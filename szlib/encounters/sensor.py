@@ -126,7 +126,7 @@ def count_ends(
     Parameters
     ----------
     rows : of the tracks at whole seconds, by person and time.
-    inside : whether each of them is in the area.
+    inside : whether each of them is in the area, and not at the begin or end of the recording.
     left : time from each of them to the begin, and to the end, of its track, shape (2, n) [s].
     unit : number of the unit of each person: only others are strangers.
     """

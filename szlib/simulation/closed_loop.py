@@ -179,7 +179,9 @@ def drive(
     people = _People(scenario, zone, loop, settings)
     recorder = _Recorder()
     duration = scenario.duration if loop.max_time is None else loop.max_time
-    require(0 <= duration < inf, "max_time", duration, "at least 0", SolverError)
+    require(
+        0 <= duration < inf, "max_time", duration, "finite, at least 0", SolverError
+    )
     arrival: int | None = None
     controller.reset()
     own = robot.start(scenario.start)
@@ -196,8 +198,9 @@ def drive(
             arrival = k
             if loop.until_arrival:
                 break
-        name = f"the control at {time:g} s"
-        control = check_array(name, recorder.controls[-1], (len(robot.inputs),))
+        control = check_array(
+            f"the control at {time:g} s", recorder.controls[-1], (len(robot.inputs),)
+        )
         own = robot.advance(own, control, settings.dt)
     return SimulationLog(
         scenario=scenario,
@@ -298,9 +301,8 @@ class _Recorder:
         duration: float,
     ) -> None:
         """Record a `step`, which took a `duration` [s], and the places of the people `seen`."""
-        expected = "an object with control"
-        has_control = hasattr(step, "control")
-        require(has_control, "what step returns", step, expected, SolverError)
+        is_step = hasattr(step, "control")
+        require(is_step, "a step", step, "an object with control", SolverError)
         self._states.append(state)
         self.controls.append(np.asarray(step.control, float))
         self._seen.append(seen)
@@ -314,12 +316,12 @@ class _Recorder:
             self._people += (*person.position, heading, *person.velocity)
         defaults = _UNREPORTED | {"solve_time": duration}
         for name, column in self._reported.items():
-            column.append(getattr(step, name, defaults[name]))
+            value = getattr(step, name, None)
+            column.append(defaults[name] if value is None else value)
 
     def collect(self, n_people: int, n_fixed: int) -> dict[str, Any]:
         """The arrays of the run, as of `Run`."""
         reported = self._reported
-        numbers = ("slack", "solve_time", "stuck")
         return {
             "states": np.array(self._states),
             "controls": np.array(self.controls),
@@ -328,10 +330,13 @@ class _Recorder:
             "residual": _align_residuals(
                 reported["residual"], self._seen, n_people, n_fixed
             ),
-            "status": np.array(reported["status"], str),
+            "status": np.array(reported["status"]),
             "safe": np.array(reported["safe"], bool),
             "has_safety_claims": reported["safe"][0] is not None,
-            **{name: np.array(reported[name], float) for name in numbers},
+            **{
+                name: np.array(reported[name], float)
+                for name in ("slack", "solve_time", "stuck")
+            },
         }
 
 

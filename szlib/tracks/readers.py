@@ -47,9 +47,6 @@ _HEAD = 1 << 16  # bytes of a text by which its day is found
 # distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
 _FASTEST = 5.0
 _BLUR = 0.5
-_MOST_SHARED = (
-    0.5  # share of (id, x, y), to 1 cm, that two recordings may have in common
-)
 _SOON = 5.0
 
 Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
@@ -343,14 +340,14 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
 
     Files without a calendar are recordings of their own, called by their names.  Files of a calendar day are
     its pieces.  Raises DataError where somebody in two of them is in two places at once, or two recordings
-    have the same name, or the same rows, to 1 cm.
+    have the same name, or the same rows, to 1 cm and 10 ms.
     """
     names = name_recordings([file.path for file in files])
     pairs = [*zip(files, names, strict=True)]
     check_names([name for file, name in pairs if file.is_named])
     known = dict[Any, str]()
     for file, name in pairs:
-        content = file.rows.select("id", "t", col("x", "y").round(2)).hash_rows().sum()
+        content = file.rows.select("id", col("t", "x", "y").round(2)).hash_rows().sum()
         first = known.setdefault(content, name)
         if file.is_named and first != name:
             raise DataError(

@@ -587,3 +587,13 @@ def test_a_robot_leaves_a_person_whom_it_overlaps_without_moving_towards_them(
         gaps.append(np.hypot(*(own[:2] - person.position)) - contact)
     overlap = np.minimum(gaps, 0.0)
     assert overlap[-1] == 0.0 and np.diff(overlap).min() > -1e-3
+
+
+def test_a_robot_that_overlaps_somebody_rests_while_another_person_is_unknown():
+    settings = szlib.MPCSettings.among_people(r_robot=0.3, v_max=0.8)
+    drive = szlib.DifferentialDrive(ZONE, settings=settings, omega_max=2.0)
+    own = np.zeros(5)
+    for _ in range(20):
+        step = drive.step(own, GOAL, [[0.156, -0.233, 0.0, 0.0], [np.nan] * 4])
+        own = drive.robot.advance(own, step.control, settings.dt)
+    assert own[:3] == pytest.approx(0.0, abs=1e-9) and step.unknown == 1

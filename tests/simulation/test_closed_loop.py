@@ -336,7 +336,7 @@ class Silent(Straight):
             r"the control at 0 s must have shape \(2,\)",
         ),
         (None, None, "controller must be an object with reset and step"),
-        (Silent(), None, "what step returns must be an object with control; got None"),
+        (Silent(), None, "a step must be an object with control; got None"),
         (
             Broken(residual=np.zeros((1, 2))),
             lambda t, _: [person(0.0, y) for y in (2, 3)],
@@ -352,7 +352,7 @@ def test_invalid_controllers_and_crowds_are_rejected(controller, crowd, message)
 
 @pytest.mark.parametrize("seconds", [-1.0, np.inf, np.nan])
 def test_time_limits_that_are_negative_or_no_numbers_are_rejected(seconds):
-    with pytest.raises(szlib.SolverError, match="max_time must be at least 0"):
+    with pytest.raises(szlib.SolverError, match="max_time must be finite, at least 0"):
         szlib.simulate(WALK, Straight(), max_time=seconds)
     assert len(szlib.simulate(WALK, Straight(), max_time=0.0).states) == 1
 

@@ -100,7 +100,11 @@ def test_copies_of_a_recording_are_refused_whatever_their_names(tmp_path: Path) 
     shuffled = write(tmp_path / "again.csv", rows.sample(frac=1, random_state=0))
     packed = tmp_path / "packed.csv.gz"
     packed.write_bytes(gzip.compress(first.read_bytes()))
-    for copy in (shuffled, packed):
+    rounded = tmp_path / "rounded.csv"
+    rows.assign(t=rows["t"] + 1e-9).to_csv(rounded, float_format="%.3f")
+    single = tmp_path / "single.parquet"
+    rows.astype({"t": "float32", "x": "float32"}).to_parquet(single)
+    for copy in (shuffled, packed, rounded, single):
         with pytest.raises(szlib.DataError, match=r"monday and .* hold the same rows"):
             szlib.read_tracks([first, copy])
     with pytest.raises(szlib.DataError, match="hold the same rows"):
