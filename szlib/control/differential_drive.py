@@ -329,10 +329,10 @@ class DifferentialDrive(MPCCBF):
         status, plan, (walls_safe, passively_safe) = found
         rests = not plan.inputs.any()
         is_held = status == "braking" and walls_safe and (rests or not passively_safe)
-        x, y, theta, *_ = self._own.tolist()
-        bodies = find_bodies(scene.zones, self.settings)
         if not is_held or scene.tracked.unknown:
             return found
+        x, y, theta, *_ = self._own.tolist()
+        bodies = find_bodies(scene.zones, self.settings)
         if bodies.gaps(x, y).min(initial=0.0) >= -TOLERANCE:
             return found
         s = self._s

@@ -222,8 +222,7 @@ class Step:
     def h(self) -> Array:
         """Barriers in the state itself, shape (obstacles,) [m].
 
-        Where one is negative, the robot already is where it should not be, and the plan leads out
-        again.
+        Where one is negative, the robot already is where it should not be, and the plan leads out again.
         """
         return self.scene.barriers.h(*self.scene.state[:2])
 
