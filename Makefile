@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The notebooks show their figures in every verb, and their kernels are those of .venv.
 unexport MPLBACKEND JUPYTER_PATH
 
-.PHONY: run report docs slides test lab bench lock lowest audit hostile notebooks dist clean
+.PHONY: run report docs slides test slow lab bench lock lowest audit hostile notebooks dist clean
 
 run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza; fails where a check does not hold
 	$(BIN)/szlib run
@@ -28,13 +28,18 @@ docs: $(INSTALLED)  ## results/site: README, notebooks, which settings to choose
 slides: $(INSTALLED)  ## results/slides: a deck and a handout (PDF) of each notebook, and all figures; SLIDES_FLAGS="07 08": some
 	$(BIN)/python notebooks/tools/slides.py $(SLIDES_FLAGS)
 
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
 # Types are checked beside the tests; both must pass.  The notebooks are executed by `make run`, not here.
-test: $(INSTALLED)  ## style, types, and every test
+test: $(INSTALLED)  ## style, types, and every test that takes no more than a few seconds
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	@$(BIN)/mypy & types=$$!; \
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder; tests=$$?; \
+	$(PYTEST) -m "not slow"; tests=$$?; \
 	wait $$types && exit $$tests
+
+slow: $(INSTALLED)  ## the other tests: whole systems, attacks, and statistics of many crowds
+	$(PYTEST) -m slow
 
 # root, as in most containers, must be allowed to; there too: make lab LAB_FLAGS="--allow-root --no-browser --ip=0.0.0.0"
 LAB_FLAGS ?= $(if $(filter 0,$(shell id -u 2>/dev/null)),--allow-root)

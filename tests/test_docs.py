@@ -23,6 +23,7 @@ def test_the_page_of_decisions_links_files_and_names_what_exists():
         assert hasattr(szlib, name), name
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fewer than 20 encounters:szlib.DataWarning")
 def test_the_commands_and_programs_of_the_page_of_decisions_run(
     tmp_path, monkeypatch, capsys

@@ -18,6 +18,7 @@ PROGRAMS = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
 WHOLE, OWN_DATA, OWN_ROBOT = (compile(text, "README.md", "exec") for text in PROGRAMS)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fewer than 20 encounters:szlib.DataWarning")
 def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(
     tmp_path, monkeypatch, capsys
@@ -36,6 +37,7 @@ def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(
     }
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fewer than 3 people walked:szlib.DataWarning")
 def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(
     tmp_path, monkeypatch, capsys

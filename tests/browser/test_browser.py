@@ -11,6 +11,8 @@ from laboratory import Laboratory
 import szlib
 from szlib.workbook.report import write_report
 
+pytestmark = pytest.mark.slow
+
 MINUTES = 60_000
 COMMANDS = "window.jupyterapp.commands"
 

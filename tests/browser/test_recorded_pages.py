@@ -4,6 +4,8 @@ import pytest
 from helpers.recorded_worlds import AXES, make_world
 from laboratory import Recording
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):

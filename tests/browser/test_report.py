@@ -12,7 +12,10 @@ VERDICT = "undecided: no null model"
 WIDE, NARROW = (1300, 900), (390, 844)
 
 
-pytestmark = pytest.mark.usefixtures("sentences_held_by_notebook_10")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.usefixtures("sentences_held_by_notebook_10"),
+]
 
 
 @pytest.fixture(scope="module")

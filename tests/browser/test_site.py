@@ -16,6 +16,7 @@ from szlib.core.files import claim_folder
 
 ROOT = Path(__file__).parents[2]
 pytest.importorskip("myst_nb")
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -224,6 +224,7 @@ def test_every_step_is_safe_where_there_is_nobody_and_no_wall():
     assert all(step.safe for step in steps)
 
 
+@pytest.mark.slow
 def test_the_disc_stays_clear_between_samples_after_every_safe_step():
     """People and walls, by Euclidean distance, ten times within each step; positions by integration."""
     checked = 0
@@ -567,6 +568,7 @@ def test_forged_claims_of_the_guard_are_faults_of_a_drive_step():
     assert any("does not" in fault for fault in lie.verify().faults)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega_max", [2.0, 4.0])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_robot_leaves_a_person_whom_it_overlaps_without_moving_towards_them(

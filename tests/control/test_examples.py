@@ -59,6 +59,7 @@ def test_the_plain_loop_arrives(load, capsys):
     assert "arrived after" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("has_walls", "seconds", "goals"), [(False, 25.0, 1), (True, 40.0, 2)]
 )

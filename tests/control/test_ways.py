@@ -98,6 +98,7 @@ def drive(
 # --- around walls -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_routes_are_free_of_walls_and_nearly_as_short_as_they_can_be() -> None:
     rng, compared, around = np.random.default_rng(0), 0, 0
     for _ in range(40):

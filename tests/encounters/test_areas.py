@@ -393,35 +393,41 @@ def test_walked_area_ignores_queues_jumps_and_ids():
     )
 
 
-def views():
-    """People in rooms and in the view of a camera, few and many, and where they can be seen."""
-    oblique = shapely.Polygon([(0, 0), (16, 2), (20, 13), (-1, 11)])
-    wide, few = (
-        make_hall(2, people=500, size=(24, 18)),
-        make_hall(people=60, size=(24, 18)),
-    )
-    seen = [
-        each[shapely.contains_xy(oblique, each["x"], each["y"])] for each in (wide, few)
-    ]
-    return {
-        "hall": (make_hall(), HALL),
-        "hall of many people": (make_hall(people=900), HALL),
-        "few people": (make_hall(people=60, size=(15, 13)), shapely.box(0, 0, 15, 13)),
-        "corridor": (make_hall(people=300, size=(20, 5)), shapely.box(0, 0, 20, 5)),
-        "view": (seen[0].reset_index(drop=True), oblique),
-        "view of few people": (seen[1].reset_index(drop=True), oblique),
-        "room that is turned": (
-            turned_tracks(make_hall(size=(11, 11)), 0.6),
-            turned(shapely.box(0, 0, 11, 11), 0.6),
-        ),
-    }
+OBLIQUE = shapely.Polygon([(0, 0), (16, 2), (20, 13), (-1, 11)])
+
+
+def see(tracks):
+    """Those of `tracks` in the view of a camera."""
+    is_seen = shapely.contains_xy(OBLIQUE, tracks["x"], tracks["y"])
+    return tracks[is_seen].reset_index(drop=True)
+
+
+VIEWS = {
+    "hall": (make_hall, HALL),
+    "hall of many people": (lambda: make_hall(people=900), HALL),
+    "few people": (
+        lambda: make_hall(people=60, size=(15, 13)),
+        shapely.box(0, 0, 15, 13),
+    ),
+    "corridor": (
+        lambda: make_hall(people=300, size=(20, 5)),
+        shapely.box(0, 0, 20, 5),
+    ),
+    "view": (lambda: see(make_hall(2, people=500, size=(24, 18))), OBLIQUE),
+    "view of few people": (lambda: see(make_hall(people=60, size=(24, 18))), OBLIQUE),
+    "room that is turned": (
+        lambda: turned_tracks(make_hall(size=(11, 11)), 0.6),
+        turned(shapely.box(0, 0, 11, 11), 0.6),
+    ),
+}
+"""How to make tracks of people, few and many, and where they can be seen."""
 
 
 @pytest.mark.filterwarnings("ignore:.* of the area found:szlib.DataWarning")
-@pytest.mark.parametrize("name", views())
+@pytest.mark.parametrize("name", VIEWS)
 def test_walked_area_never_reaches_outside_where_people_can_be_seen(name):
-    tracks, view = views()[name]
-    found = szlib.walked_area(tracks)
+    make, view = VIEWS[name]
+    found = szlib.walked_area(make())
     reached = found.polygon
     assert view.buffer(0.15).covers(reached)
     assert reached.area > 0.6 * view.area

@@ -356,6 +356,7 @@ def contents_after_an_hour(days, out):
     return contents(out)
 
 
+@pytest.mark.slow
 def test_killed_runs_resume_to_the_same_result(days, reference, tmp_path):
     assert kill_and_resume(days, tmp_path / "out", reference, kills=2, seed=1) > 0
 
@@ -370,6 +371,7 @@ def _die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_dask_cluster_that_loses_a_worker_gives_the_same_result(
     days, reference, tmp_path
 ):

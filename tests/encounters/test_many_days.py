@@ -69,10 +69,12 @@ def check(printed, out, samples):
     )
 
 
+@pytest.mark.slow
 def test_on_this_machine(days, samples, tmp_path):
     check(run("local", "2", days, tmp_path / "out"), tmp_path / "out", samples)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     shutil.which("setsid") is None, reason="the scripts in place of SLURM need setsid"
 )
@@ -116,6 +118,7 @@ def home(tmp_path):
         running.terminate()
 
 
+@pytest.mark.slow
 def test_on_machines_with_ssh(days, samples, home):
     check(
         run("ssh", "node1,node2", days, home / "out", HOME=str(home)),

@@ -104,6 +104,7 @@ def test_invalid_arguments_raise(tracks, null):
         szlib.null_encounters(tracks, shifts=1, progress=False, min_distanse=1.0)
 
 
+@pytest.mark.slow
 def test_groups_do_not_look_like_respect():
     """Lone encounters of people of whom 70 % walk in groups abreast, and nobody reacts to anybody."""
     found = []

@@ -219,6 +219,7 @@ def test_shifts_are_in_proportion_in_recordings_shorter_than_eleven_minutes(
         assert minutes.max() <= 10 * share + 0.02
 
 
+@pytest.mark.slow
 def test_null_model_of_six_minutes_needs_no_minutes(tracks):
     short = tracks[tracks["t"] < tracks["t"].min() + 360]
     null = szlib.null_encounters(short, shifts=2, progress=False)

@@ -33,6 +33,7 @@ def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
     assert tally["worlds"] == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("island", "place"), [(119, 3), (142, 5), (223, 25)])
 def test_a_world_that_once_broke_a_claim_breaks_none(island, place):
     """In the first one a robot that creeps at 1.05 mm/s was said to rest.

@@ -18,6 +18,7 @@ import szlib
 from szlib.workbook.cli import build_parser
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "attack",
     [

@@ -52,6 +52,7 @@ def test_half_is_where_the_ratio_rises_through_one_half():
     assert np.isnan(collision.find_half(value, expected, expected, 0 * n))
 
 
+@pytest.mark.slow
 def test_a_circle_that_nobody_enters_is_found_at_the_nearest_approach():
     """Pairs who pass straight by each other at 0 to 5 m; those of the data at no less than `CIRCLE`."""
     n, t = 4000, np.arange(-3, 3.01, 0.2)

@@ -58,6 +58,7 @@ def quiet():
 # --- the tasks ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TASKS)
 class TestEach:
     def test_the_solution_passes_and_each_wrong_answer_gets_its_message(self, name):
@@ -182,6 +183,7 @@ def test_each_check_has_a_process_of_its_own():
     assert first == again
 
 
+@pytest.mark.slow
 def test_the_time_of_the_judge_is_not_charged_to_the_answer():
     def cases(rng):
         for x in (3.0, 4.0, 5.0):
@@ -270,6 +272,7 @@ def test_the_first_wrong_number_of_a_large_array_is_shown():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CHEATS)
 def test_no_cheat_passes_and_none_holds_the_judge(kind, monkeypatch):
     """`tests/studies/exercises.py --cheats` does the same in 300 checks of each."""
@@ -285,6 +288,7 @@ def test_no_cheat_passes_and_none_holds_the_judge(kind, monkeypatch):
         assert slow or time.monotonic() - start < 30, source
 
 
+@pytest.mark.slow
 def test_what_a_notebook_does_to_its_judges_changes_nothing(tmp_path):
     """The judges of a check are another process; marks come from the text of a sheet."""
     sheet = tmp_path / "sheet.py"
@@ -307,6 +311,7 @@ def test_what_a_notebook_does_to_its_judges_changes_nothing(tmp_path):
     assert marks == {"velocity": 0, "speed_limit": minutes}
 
 
+@pytest.mark.slow
 def test_the_command_that_marks_gives_a_solved_sheet_all_its_points():
     """Its first cell imports Matplotlib, as those of most sheets do; all its functions are the solutions."""
     sheet = folders.NOTEBOOKS / "solutions" / "sheet1_tracks.ipynb"

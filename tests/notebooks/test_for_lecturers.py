@@ -71,6 +71,7 @@ def test_a_misconception_is_corrected_in_a_section_that_exists(week):
         assert section in headings, f"{number}, {section}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("week", WEEKS, ids=lambda week: week[0])
 def test_each_week_has_a_plan_of_90_minutes(week):
     """Minutes follow each other; a scene is a section of a chapter of the week, a task or the project."""

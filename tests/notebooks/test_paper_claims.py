@@ -195,6 +195,7 @@ def test_zones_without_people_on_some_side_decide_nothing(plaza):
         assert found.verdict.startswith("not decidable")
 
 
+@pytest.mark.slow
 def test_a_shape_is_a_difference_from_the_null_model():
     crowd, null = passing_pairs(1000, 1), null_of(passing_pairs(2000, 0))
     people = respecting(crowd, szlib.Ellipse((0.0, 0.0), (0.9, 0.7)), careless=0.05)

@@ -63,6 +63,7 @@ def run():
     return run
 
 
+@pytest.mark.slow
 def test_a_larger_gamma_with_a_longer_barrier_beats_the_papers_settings(run):
     ours = run(BOLDER, "intersection", 2)
     paper = run((PROJECT / "rivals" / "paper.py").read_text(), "intersection", 2)
@@ -114,6 +115,7 @@ def test_a_faulty_submission_is_refused_with_the_reason(run, source, reason):
     assert pd.Series([row["refused"]]).str.contains(reason).item(), row["refused"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "start",
     [
@@ -216,6 +218,7 @@ def test_the_motors_have_limits(tmp_path):
     assert log.speed.max() == pytest.approx(RULES.v_max)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(
     tmp_path, monkeypatch, capsys
 ):

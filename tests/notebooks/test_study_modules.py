@@ -119,6 +119,7 @@ def test_a_case_is_the_plaza_that_its_row_names():
         assert settings.true_zone(plazas.SPEED).center[0] == pytest.approx(case[3])
 
 
+@pytest.mark.slow
 def test_an_interval_of_a_plaza_holds_the_truth_or_not():
     samples, null = plazas.find_both(plazas.SMALL, plazas.FIRST_SEED)
     truth = plazas.build(plazas.SMALL).true_zone(plazas.SPEED)

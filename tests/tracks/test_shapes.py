@@ -305,6 +305,7 @@ def test_people_of_magni_are_the_same_at_any_rate(tmp_path: Path) -> None:
     assert szlib.read_tracks(path)["id"].unique().tolist() == [101, 102]
 
 
+@pytest.mark.slow
 def test_memory_is_charged_by_decoded_bytes(tmp_path: Path) -> None:
     """A long id in a dictionary, and a blob that SQLite makes: small files, large columns."""
     rows = pd.concat([H[["t", "x", "y"]]] * 40).assign(id="p" * 20_000)

@@ -125,6 +125,7 @@ def test_error_names_an_address_without_scheduler(
         assert client is None
 
 
+@pytest.mark.slow
 def test_extract_waits_for_workers_that_come_late(day, tmp_path):
     """As in a queue: the scheduler is up, its workers start later; without `--wait` the error says so."""
     pytest.importorskip("distributed")

@@ -35,6 +35,7 @@ def fit(*arguments):
     return main(["fit", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_zone_from_tracks_is_that_of_the_library(recording, expected, tmp_path, capsys):
     out = tmp_path / "zone.json"
     assert fit(recording, "--out", out) == 0
@@ -54,6 +55,7 @@ def test_zone_from_tracks_is_that_of_the_library(recording, expected, tmp_path, 
     assert (tmp_path / "zone.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("always::szlib.DataWarning")
 @pytest.mark.parametrize("method", ["respect", "paper"])
 def test_rejected_rows_are_told_and_move_no_zone(
@@ -99,6 +101,7 @@ def test_columns_of_other_names_and_units_are_read(recording, tmp_path):
     assert zone.provenance["encounters"] == expected["encounter"].nunique()
 
 
+@pytest.mark.slow
 def test_extracted_days_have_no_null_model_until_their_tracks_are_given(
     recording, tmp_path, capsys
 ):

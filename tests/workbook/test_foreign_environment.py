@@ -51,6 +51,7 @@ def foreign(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", "/proc/nowhere")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("foreign")
 def test_figures_and_kernel_are_the_runs_own(notebooks, tmp_path):
     notebooks(_01_draw=DRAW)
@@ -60,6 +61,7 @@ def test_figures_and_kernel_are_the_runs_own(notebooks, tmp_path):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("foreign")
 def test_kernel_imports_nothing_from_its_folder_and_leaves_no_temporary_file(
     notebooks, tmp_path, monkeypatch

@@ -271,6 +271,7 @@ def test_defaults_of_the_notebooks_are_in_range():
         check_parameters(given, [source])
 
 
+@pytest.mark.slow
 def test_kernel_gets_parameters_as_text_and_reports_errors(
     notebooks, tmp_path, monkeypatch
 ):
@@ -347,6 +348,7 @@ def test_sigterm_stops_extract_with_exit_code_143(tmp_path):
     assert not list(tmp_path.rglob(".szlib-part-*"))
 
 
+@pytest.mark.slow
 def test_sigterm_stops_a_run_and_its_kernels(notebooks, tmp_path):
     sleeper = """
 import os, time

@@ -69,6 +69,7 @@ def test_every_pair_on_the_plaza_gives_its_zone(tmp_path):
     assert (a, b) == pytest.approx(true.semi_axes, abs=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("zone", "careless"),
     [
@@ -86,6 +87,7 @@ def test_an_imposed_zone_is_found(zone, careless, large_null):
     assert (m, a) == pytest.approx((zone.center[0], zone.semi_axes[0]), abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_zone_grows_with_speed_if_people_do_so(
     large_null,
 ):
@@ -102,6 +104,7 @@ def test_the_zone_grows_with_speed_if_people_do_so(
     assert (grown > 0.15).all(), "0.48 for each m/s, less what the prior takes"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_people_who_ignore_each_other_have_no_zone(seed, null):
     with pytest.raises(
@@ -123,6 +126,7 @@ def test_it_does_not_matter_who_is_the_reference(data, null, estimator):
         assert found.cost(p)[0] == pytest.approx(expected.cost(p)[0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_mirror_image_has_the_mirrored_zone(data, null, estimator):
     def mirror(samples):
         return samples.assign(
@@ -142,6 +146,7 @@ def test_the_order_of_rows_does_not_matter(data, null, estimator):
         assert found.cost(p)[0] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_other_kinds_do_not_count(data, null, estimator):
     companions = respecting(
         passing_pairs(200, 9), szlib.Ellipse((0.0, 0.0), (1.5, 1.5))
@@ -325,6 +330,7 @@ def test_the_posterior_is_never_surer_than_the_model_is_right(
 # --- the default, and what is refused ----------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:at 1.1 m/s fewer than 20")
 def test_the_default_is_the_paper_s_where_the_null_model_is_small_or_shows_no_respect(
     data, null

@@ -55,6 +55,7 @@ def test_p_values_are_uniform_under_the_null():
     assert share == pytest.approx([0.25, 0.5, 0.75], abs=0.1)
 
 
+@pytest.mark.slow
 def test_noninteracting_crowd_shows_no_respect():
     """notebooks/tables/06_nobody.csv has 100 seeds."""
     p = []

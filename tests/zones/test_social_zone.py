@@ -495,6 +495,7 @@ def made_null(n=3000, *, r_max=2.0):
     )
 
 
+@pytest.mark.slow
 def test_respect_zone_is_found_and_saved_with_its_test(tmp_path):
     people = respecting(
         passing_pairs(1200, 1), szlib.Ellipse((0.0, 0.0), (0.8, 0.7)), careless=0.05

@@ -254,6 +254,7 @@ def test_controller_warns_unless_usable(careful):
 # --- the radius that it rests on ---------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("core", [0.5, 0.8, 1.0])
 def test_core_is_found_and_held(core):
     radii = [
@@ -277,6 +278,7 @@ def walk_around(core, noise=0.0):
     return szlib.null_test(szlib.find_pairs(tracks, area=crowds.AREA), against)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("core", [0.5, 1.0])
 def test_people_who_step_aside_do_not_shrink_the_radius(core):
     """They are seen just outside of the circle around which they swerve."""
@@ -319,6 +321,7 @@ def test_mix_of_kinds_does_not_matter():
     assert both.low == 0
 
 
+@pytest.mark.slow
 def test_cores_in_simulated_crowds_are_found():
     tracks = noninteracting_crowd(seed=5, people=1500, minutes=30)
     samples = szlib.find_encounters(tracks)
