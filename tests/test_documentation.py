@@ -181,7 +181,16 @@ def examples(module):
     ]
 
 
-@pytest.mark.parametrize("module", MODULES)
+LONG = "szlib.zones.social_zone"  # its examples fit zones
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        pytest.param(each, marks=pytest.mark.slow) if each == LONG else each
+        for each in MODULES
+    ],
+)
 def test_every_example_runs(module, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     matplotlib.use("Agg")

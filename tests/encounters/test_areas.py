@@ -354,6 +354,7 @@ def test_walked_area_closes_gaps_narrower_than_four_metres(gap, is_closed):
     assert len(shapely.get_parts(found.polygon)) == (1 if is_closed else 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("side", "is_hole"), [(2.0, False), (6.0, True)])
 def test_walked_area_excludes_a_wide_pillar(side, is_hole):
     low, high = 15 - side / 2, 15 + side / 2
@@ -423,6 +424,7 @@ VIEWS = {
 """How to make tracks of people, few and many, and where they can be seen."""
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* of the area found:szlib.DataWarning")
 @pytest.mark.parametrize("name", VIEWS)
 def test_walked_area_never_reaches_outside_where_people_can_be_seen(name):
@@ -525,6 +527,7 @@ def by_day(samples):
     return samples.groupby(samples["day"].astype(str))["encounter"].nunique().to_dict()
 
 
+@pytest.mark.slow
 def test_recordings_without_a_calendar_have_each_their_own_area(
     rooms,
 ):
@@ -590,6 +593,7 @@ def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
     assert given.tracks()["x"].max() < 16
 
 
+@pytest.mark.slow
 def test_without_an_area_only_files_of_the_atc_mall_have_its_square(
     tmp_path,
 ):

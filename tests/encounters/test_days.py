@@ -93,6 +93,7 @@ def test_result_does_not_depend_on_order_or_processes(days, reference, tmp_path)
     assert zones[0].provenance == zones[1].provenance
 
 
+@pytest.mark.slow
 def test_finished_days_are_kept_and_changed_days_computed_again(days, tmp_path):
     out, copies = tmp_path / "out", [tmp_path / day.name for day in days]
     for copy, day in zip(copies, days, strict=True):

@@ -26,6 +26,7 @@ def null(tracks):
     return szlib.null_encounters(tracks, shifts=7, seed=4, progress=False, **ASKED)
 
 
+@pytest.mark.slow
 def test_each_shift_equals_encounters_of_the_shifted_day(tracks, null):
     for shift in (0, 3, 6):
         day = szlib.time_shifted(tracks, seed=(4, shift), minutes=ASKED["minutes"])

@@ -46,6 +46,7 @@ def nearest_by_loop(tracks, r_max=2.0):
     return found
 
 
+@pytest.mark.slow
 def test_pairs_are_those_of_a_search_of_each_moment(tracks):
     pairs = szlib.find_pairs(tracks, area=crowds.AREA, kinds=None)
     nearest = pairs.groupby(["ref_id", "other_id"])["distance"].min().to_dict()

@@ -284,6 +284,7 @@ def test_a_larger_zone_makes_the_robot_later():
     assert zone.scaled(2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
 
 
+@pytest.mark.slow
 def test_sensitivity_varies_one_parameter_at_a_time(tmp_path):
     settings = szlib.PlazaSettings(n_encounters=250)
     tracks = szlib.read_tracks(

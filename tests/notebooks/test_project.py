@@ -82,6 +82,7 @@ def test_points_are_the_time_alone_over_the_time_with_a_price_for_zones(run):
     assert found["points"] < 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("source", "reason"),
     [
@@ -252,6 +253,7 @@ def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(
     assert "line 1: ZeroDivisionError" in table["refused"].dropna().str.cat()
 
 
+@pytest.mark.slow
 def test_the_template_runs_as_it_is_and_is_not_refused(run, tmp_path):
     template = PROJECT / "my_controller.py"
     subprocess.run(

@@ -110,6 +110,7 @@ def test_the_pipeline_finds_the_true_zone(plazas, seed):
     assert np.abs((np.degrees(turned) + 90) % 180 - 90).max() < 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "pace"), [(0.0, "rushing"), (0.01, "slow"), (0.02, "rushing")]
 )
@@ -121,6 +122,7 @@ def test_whole_encounters_find_every_intruder(share, pace):
     assert not found["recall"] < 1  # nan: there are none
 
 
+@pytest.mark.slow
 def test_the_zone_does_not_shrink_at_the_size_of_the_paper(
     plazas,
 ):

@@ -60,6 +60,7 @@ def test_a_data_set_is_downloaded_once(served, tmp_path):
     assert datasets.find("atc-1hz") == [file]
 
 
+@pytest.mark.slow
 def test_a_file_with_a_wrong_hash_is_refused_and_removed(served, tmp_path):
     (served / "a.csv").write_text("tampered")
     with pytest.raises(DataError, match="hash"):
@@ -83,6 +84,7 @@ def served_days(served, monkeypatch):
     return served
 
 
+@pytest.mark.slow
 def test_ten_days_are_downloaded_once_and_verified(served_days, tmp_path):
     files = datasets.find("atc-10-days")
     assert [file.name for file in files] == ["1024.csv", "1028.csv"]

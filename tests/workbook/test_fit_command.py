@@ -78,6 +78,7 @@ def test_rejected_rows_are_told_and_move_no_zone(
     assert sizes[1] == pytest.approx(sizes[0], abs=0.03)
 
 
+@pytest.mark.slow
 def test_columns_of_other_names_and_units_are_read(recording, tmp_path):
     tracks = szlib.read_tracks(recording)[["t", "id", "x", "y"]]
     tracks[["x", "y"]] *= 100
@@ -126,6 +127,7 @@ def test_kinds_are_those_of_the_library(recording, tmp_path):
     assert szlib.SocialZone.load(out).ellipses == expected.ellipses
 
 
+@pytest.mark.slow
 def test_a_file_that_is_two_days_of_a_folder_is_refused(tmp_path, capsys):
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv"))
     tracks["t"] -= tracks["t"].min()
@@ -249,6 +251,7 @@ def test_damaged_day_is_named(recording, tmp_path, capsys):
     )
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_the_earlier_zone(recording, tmp_path, capsys):
     days, out = recording.with_name("days"), tmp_path / "zone.json"
     assert fit(days, "--out", out) == 0

@@ -335,6 +335,7 @@ def test_a_reader_that_ends_early_ends_the_command_in_silence(tmp_path):
     assert done.returncode == 128 + signal.SIGPIPE
 
 
+@pytest.mark.slow
 def test_sigterm_stops_extract_with_exit_code_143(tmp_path):
     days = [make_plaza(tmp_path / f"d{k}.csv", settings=PlazaSettings(n_encounters=300, date=f"2000-01-0{k}"))
             for k in range(1, 10)]  # fmt: skip

@@ -375,6 +375,7 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
     assert "stopped" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="kernels are not forked")
 def test_a_stopped_run_leaves_the_server_of_kernels_to_the_next_run(
     notebooks, monkeypatch

@@ -59,6 +59,7 @@ def random_parameters(seed):
 # --- truth -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_pair_on_the_plaza_gives_its_zone(tmp_path):
     """Nearly all of its people pass just outside of a zone, where chance has hardly anybody."""
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=3))
@@ -250,6 +251,7 @@ def test_the_mean_of_g_is_that_of_both_samples(seed):
     assert chance_level(np.ones(20), np.ones(70)) == pytest.approx((1.0, 0.0))
 
 
+@pytest.mark.slow
 def test_the_posterior_has_the_curvature_of_its_density(
     estimator,
 ):

@@ -287,6 +287,7 @@ def test_people_who_step_aside_do_not_shrink_the_radius(core):
     assert found.high - found.low < 0.15
 
 
+@pytest.mark.slow
 def test_noise_hardly_shrinks_the_radius():
     """The nearest of many distances with an error of 7 cm is 9 cm too near."""
     assert walk_around(0.8, noise=0.05).respect.radius == pytest.approx(0.8, abs=0.05)
