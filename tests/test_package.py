@@ -300,6 +300,7 @@ def test_a_robot_needs_only_the_packages_of_a_plain_install():
     assert "casadi" in robot and data & robot == set()
 
 
+@pytest.mark.slow
 def test_what_kernels_are_forked_with_has_no_threads_of_polars():
     """A fork does not survive them: a notebook would wait for ever when it reads tracks."""
     from szlib.workbook.execution import PRELOADED

@@ -97,7 +97,14 @@ def draw_people(rng: np.random.Generator, state: Any) -> Iterator[tuple[Any, Any
         yield seen[present], [ids[i] for i in np.flatnonzero(present)]
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+UNUSUAL = "small and fast"  # its steps are short, so its runs are long
+ROBOTS = [
+    pytest.param(each, marks=pytest.mark.slow) if each == UNUSUAL else each
+    for each in SETTINGS
+]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
 def test_no_wall_is_touched_whatever_people_do_and_whatever_a_sensor_says(
     name: str,
 ) -> None:
@@ -213,7 +220,7 @@ def drive_in_room(
         people = people + dt * np.c_[people[:, 2:], np.zeros((n, 2))]
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_a_passively_safe_robot_rests_when_people_who_keep_walking_reach_it(
     name: str,
 ) -> None:
@@ -234,7 +241,7 @@ def test_a_passively_safe_robot_rests_when_people_who_keep_walking_reach_it(
     assert overlapped > 0 or name != "default", "somebody walks into a robot at rest"
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_the_robot_never_moves_towards_a_body_that_it_overlaps(name: str) -> None:
     """People may jump onto it; then it stays or goes away from where they are, from sample to sample."""
     rng, controller, found = np.random.default_rng(23), build(name), 0

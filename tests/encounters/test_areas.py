@@ -567,6 +567,7 @@ def test_recordings_are_placed_apart_once_and_one_place_stays(
     assert place_apart(rooms["a"]) is rooms["a"]
 
 
+@pytest.mark.slow
 def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
     rooms, tmp_path
 ):

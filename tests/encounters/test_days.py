@@ -362,6 +362,7 @@ def test_killed_runs_resume_to_the_same_result(days, reference, tmp_path):
     assert kill_and_resume(days, tmp_path / "out", reference, kills=2, seed=1) > 0
 
 
+@pytest.mark.slow
 def test_killed_worker_raises(days, tmp_path, monkeypatch):
     monkeypatch.setattr(extraction, "extract_day", _die)
     with pytest.raises(szlib.SzlibError, match="a worker process was killed"):

@@ -228,6 +228,7 @@ def szlib_free_line(points, a, b):
     ) / np.hypot(*(b - a))
 
 
+@pytest.mark.slow
 def test_an_answer_cannot_read_what_only_the_judge_knows():
     samples, speed = judges.case("my_zone", seed=SEED, number=1)
     assert isinstance(speed, float)

@@ -115,6 +115,7 @@ def test_the_papers_robot_stays_safe_and_the_gamma_of_its_code_does_not():
     assert share["weights and gamma of its code"] == 0.0
 
 
+@pytest.mark.slow
 def test_outliers_of_a_plaza_are_judged_by_its_truth():
     samples = paper_matrix.read_source(paper_matrix.PLAZAS, 3)
     close = samples[samples["distance"] <= 2.0]

@@ -206,6 +206,7 @@ def test_a_handout_has_no_hidden_code_and_no_answers(monkeypatch):
     assert not re.search(r"Answer|One\.|draw|check:", shown)
 
 
+@pytest.mark.slow
 def test_decks_and_figures_are_written_to_one_folder(tmp_path):
     slides.main(["10", "--out", str(tmp_path / "slides")])
     made = {file.name for file in (tmp_path / "slides").glob("10_*")}

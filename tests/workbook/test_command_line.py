@@ -81,6 +81,7 @@ main()"""
     assert (done.returncode, done.stderr) == (-signal.SIGINT, b"")
 
 
+@pytest.mark.slow
 def test_extract_prints_the_table(day, tmp_path, capsys):
     assert main(["extract", str(day), "--out", str(tmp_path / "out")]) == 0
     assert "1 done" in capsys.readouterr().out

@@ -117,6 +117,7 @@ def test_extracted_days_have_no_null_model_until_their_tracks_are_given(
     assert "no null model" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_kinds_are_those_of_the_library(recording, tmp_path):
     days, out = recording.with_name("days"), tmp_path / "zone.json"
     assert fit(days, "--out", out, "--kind", "opposite", "crossing") == 0

@@ -410,6 +410,7 @@ os.kill(os.getpid(), signal.SIGTERM)
 """
 
 
+@pytest.mark.slow
 def test_a_notebook_whose_kernel_is_ended_leaves_no_unfinished_copy(tmp_path):
     script, folder = tmp_path / "01_one.py", tmp_path / "out"
     script.write_text(KILLS_ITS_KERNEL)
