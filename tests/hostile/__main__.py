@@ -1,4 +1,4 @@
-"""The attacks: `python tests/hostile [--long] [NAME ...]`; their short form is part of `make test`.
+"""The attacks: `python tests/hostile [--long] [NAME ...]`; their short form is part of `make slow`.
 
 Every module here that is not a test has a function `attack(long)`, which returns counts of what it tried
 and found.  Counts whose name begins with "broken" must be 0; otherwise the exit code is 1.  Several attacks
@@ -22,7 +22,7 @@ TALLY = Path("results/hostile.json")
 README = HERE / "README.md"
 INTRODUCTION = """# Hostile suite
 
-`make hostile` runs every attack in full and writes this file; `make test` runs a short form of each. What
+`make hostile` runs every attack in full and writes this file; `make slow` runs a short form of each. What
 each attack does stands at the top of its module. Counts that begin with "broken" must be 0.
 An attack that has no section was not run in full since it was last changed.
 """
