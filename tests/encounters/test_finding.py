@@ -581,6 +581,7 @@ def test_the_real_day_has_about_as_many_encounters_as_the_paper(
         )
 
 
+@pytest.mark.slow
 def test_plain_loops_agree_on_the_real_day(real_tracks):
     here = real_tracks[
         szlib.ATC_SQUARE.contains(

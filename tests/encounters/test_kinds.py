@@ -267,6 +267,7 @@ def test_the_kinds_of_the_real_day(real_tracks, real_samples):
     )
 
 
+@pytest.mark.slow
 def test_few_shifted_pairs_are_companions(real_tracks):
     rng = np.random.default_rng(0)
     people, of = np.unique(real_tracks["id"], return_inverse=True)

@@ -234,6 +234,7 @@ def test_invalid_minutes_raise(tracks, minutes):
         szlib.time_shifted(tracks, minutes=minutes)
 
 
+@pytest.mark.slow
 def test_the_real_day_keeps_its_hours(real_tracks):
     moved = szlib.time_shifted(real_tracks)
     hours = [

@@ -341,6 +341,7 @@ def test_group_lines_that_share_people_are_joined(tmp_path):
 # --- the real files ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_real_grand_central_is_read():
     tracks = sites.read_grand_central(real_data("gc") / "Annotation.zip")
     check_tracks(tracks)

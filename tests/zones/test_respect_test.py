@@ -152,6 +152,7 @@ def test_excluded_encounters_do_not_count():
     ).is_significant
 
 
+@pytest.mark.slow
 def test_real_day_shows_respect(real_tracks, real_samples):
     null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
     for kinds in ("strangers", KINDS):
