@@ -158,7 +158,7 @@ class _Wheels:
         return np.array(states), np.reshape(controls, (-1, 2))
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class DriveStep(Step):
     """What a differential drive does next, and how far it can be relied upon: a `Step`.
 

@@ -164,6 +164,9 @@ class MPCCBF(Controller):
         tracker: Tracker | None = None,
     ) -> None:
         self.settings = settings or MPCSettings()
+        is_one = isinstance(self.settings, MPCSettings)
+        expected = "MPCSettings, such as MPCSettings.among_people()"
+        require(is_one, "settings", settings, expected, SolverError)
         self._s = self._plan_with(self.settings)
         self.zone = _choose_zone(zone, self._s.zone_speed)
         self.tracker = tracker or Tracker()

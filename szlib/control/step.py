@@ -121,7 +121,7 @@ class Scene(NamedTuple):
         return "" if is_safe else "its disc overlaps a body or a wall"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Step:
     """What the controller decided, and how far it can be relied upon.
 

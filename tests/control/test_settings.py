@@ -119,3 +119,8 @@ def test_a_gamma_rate_lets_h_fall_equally_fast_whatever_dt_is(dt: float) -> None
     assert szlib.MPCSettings(gamma=1).gamma_rate == np.inf
     with pytest.raises(szlib.SolverError, match="gamma must be in"):
         settings.with_gamma_rate(-1)
+
+
+def test_something_that_is_no_settings_is_refused():
+    with pytest.raises(szlib.SolverError, match=r"settings must be MPCSettings, such"):
+        szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), settings="among_people")

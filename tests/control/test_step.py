@@ -230,3 +230,9 @@ def test_a_step_is_one_line():
     assert repr(step).startswith("Step(optimal, safe, control=(") and "\n" not in repr(
         step
     )
+
+
+def test_steps_are_compared_as_objects():
+    controller = controller_of()
+    steps = [controller.step((-4, 0, 0, 0), GOAL, [FACING]) for _ in range(2)]
+    assert steps[0] == steps[0] and steps.index(steps[1]) == 1 and len({*steps}) == 2
