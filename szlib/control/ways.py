@@ -76,7 +76,9 @@ _GOAL_MOVED = 0.5
 _NEAR_WAY = 3  # cells that are near a way are at most so many steps from it
 _EVERY = 20  # turns are measured around so many cells that are not free, one of
 _MOST_SHARE = 1.2  # least offset of obstacles, in cells: no step leads across a wall
-_NEIGHBOURS = (0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)
+_NEIGHBOURS = np.array(
+    [(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)]
+)
 # price of a step to a neighbour: a robot that waits stands still [s]
 _MOVE_PRICE = 0.015
 _MOVES = _MOVE_PRICE * np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
@@ -203,16 +205,11 @@ class Map:
 
     def _link(self) -> None:
         """Find the pairs of free neighbours, in 16 directions, and their distances."""
-        pairs = list[Array]()
-        lengths = list[Array]()
         numbers = np.flatnonzero(self.free)
-        for i, j in _NEIGHBOURS:
-            to = numbers + i * self.shape[1] + j
-            is_free = self.free.ravel()[to]
-            pairs.append(np.stack([numbers, to])[:, is_free])
-            lengths.append(np.full(is_free.sum(), self.cell * hypot(i, j)))
-        self._pairs = np.hstack(pairs)
-        self._lengths = np.concatenate(lengths)
+        neighbours = numbers + (_NEIGHBOURS @ (self.shape[1], 1))[:, None]
+        direction, k = self.free.ravel()[neighbours].nonzero()
+        self._pairs = np.stack([numbers[k], neighbours[direction, k]])
+        self._lengths = self.cell * np.hypot(*_NEIGHBOURS[direction].T)
 
     def centers(self, cells: ArrayLike) -> Array:
         """Centres of `cells`, shape (..., 2) [m]."""
