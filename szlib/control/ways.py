@@ -413,9 +413,9 @@ class WayFinder:
 
 def _find_turns(way: Way, around: Array, since: float = 0.0) -> Array:
     """Angles by which a `way`, `since` a time [s] on, turns around places `around` it, shape (n,) [rad]."""
-    offset = way.at(since + _TIMES) - around
-    turns = np.diff(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)
-    return np.asarray(((turns + pi) % (2 * pi) - pi).sum(axis=1))
+    seen = (way.at(since + _TIMES) - around) @ (1, 1j)
+    angles = np.unwrap(np.angle(seen))
+    return np.asarray(angles[:, -1] - angles[:, 0])
 
 
 class Surroundings:
