@@ -193,10 +193,7 @@ class Map:
             indices = np.arange(len(counts))
             for rows in np.array_split(indices, 1 + counts.sum() // _CHUNK):
                 which = np.repeat(rows, counts[rows])
-                ends = counts[rows].cumsum()
-                place = np.arange(len(which)) - np.repeat(
-                    ends - counts[rows], counts[rows]
-                )
+                place = np.concatenate([np.arange(n) for n in counts[rows]])
                 cells = first[which].T + np.divmod(place, sizes[which, 1])
                 x, y = self.centers(cells.T).T
                 unsafe = kind.distance(x, y, 0.0, *numbers[which].T) < offsets[which]
