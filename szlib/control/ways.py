@@ -631,13 +631,10 @@ def _turn_aside(
     # complex numbers: the conjugate of u times v has the angle from u to v
     a = complex(*zone[:2]) - at
     b = complex(*zone[2:4]) - at
-    margin = s.r_robot + s.eps
-    at_goal = ellipse_formula(
-        way.real, way.imag, a.real, a.imag, b.real, b.imag, zone[4]
-    )
-    if not a * b or (at_goal < margin and hypot(*zone[7:9]) < STANDING_SPEED):
+    semi_axis = zone[4] + s.r_robot + s.eps  # of the set h < 0
+    is_goal_within = abs(way - a) + abs(way - b) < 2 * semi_axis
+    if not a * b or (is_goal_within and hypot(*zone[7:9]) < STANDING_SPEED):
         return 1.0
-    semi_axis = zone[4] + margin  # of the set h < 0
     cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
     w = acos(max(-1.0, min(1.0, cosine))) / 2
     bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
