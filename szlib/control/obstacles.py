@@ -696,15 +696,12 @@ class Obstacles(NamedTuple):
     ) -> Array:
         """The `formula` of each obstacle, shape (n, ...); of a barrier less its offset."""
         shape = np.shape(x + y + t)
-        found = np.empty((self.size, *shape))
         axes = (...,) + (None,) * len(shape)
-        begin = 0
+        found = [np.empty((0, *shape))]
         for kind, numbers, offsets in self.groups:
             values = getattr(kind, formula)(x, y, t, *numbers.T[axes])
-            end = begin + len(offsets)
-            found[begin:end] = values - offsets[axes] if is_barrier else values
-            begin = end
-        return found
+            found.append(values - offsets[axes] if is_barrier else values)
+        return np.concatenate(found)
 
 
 def find_bodies(
