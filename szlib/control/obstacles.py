@@ -641,9 +641,9 @@ class Obstacles(NamedTuple):
         robot leaves a uniform motion by at most the bow.
         """
         length = np.hypot(*np.diff(path.points, axis=0).T).sum() + path.bows.sum()
-        reach = length + self.speeds * (path.times[-1] - path.times[0])
-        at_first = path.points[0, 0], path.points[0, 1], path.times[0]
-        first = self.h(*at_first) if is_barrier else self.gaps(*at_first)
+        reach = length + self.speeds * np.ptp(path.times)
+        measure = Obstacles.h if is_barrier else Obstacles.gaps
+        first = measure(self, *path.points[0], path.times[0])
         near = self.select_near(first - reach)
         if not near.groups:
             return Bound()
@@ -653,7 +653,7 @@ class Obstacles(NamedTuple):
             np.interp(parts, np.arange(n + 1), each)
             for each in (*path.points.T, path.times)
         )
-        gaps = (near.h if is_barrier else near.gaps)(x, y, t)
+        gaps = measure(near, x, y, t)
         moved = near.speeds[:, None] * np.diff(t)
         reach = np.hypot(np.diff(x), np.diff(y)) + moved
         bows = np.repeat(path.bows, _PARTS)
