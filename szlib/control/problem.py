@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import lru_cache
 from math import hypot, inf
 from threading import Lock
 from typing import Any, NamedTuple
@@ -53,7 +53,7 @@ class Motion(NamedTuple):
     cost: Any
 
 
-@lru_cache(maxsize=64)
+@lru_cache
 def build_motion(settings: MPCSettings) -> Motion:
     """The motion of a double integrator, and the cost, for these `settings`."""
     s = settings
@@ -102,7 +102,7 @@ class Horizon(NamedTuple):
         return states
 
 
-@lru_cache(maxsize=64)
+@lru_cache
 def build_horizon(settings: MPCSettings) -> Horizon:
     """The matrices of the motion for these `settings`."""
     times = np.array(settings.times)
@@ -160,7 +160,7 @@ class Condition(NamedTuple):
     keep: tuple[float, ...]
 
 
-@cache
+@lru_cache
 def list_conditions(
     settings: MPCSettings, kind: type[Obstacle], has_floors: bool
 ) -> tuple[Condition, ...]:
@@ -234,7 +234,7 @@ def _linearise_kind(
 _MOST_CURVED = 1e3
 
 
-@lru_cache(maxsize=64)
+@lru_cache
 def _linearise_motion(settings: MPCSettings) -> Any:
     """The part of a quadratic program without obstacles: see `LinearProblem`."""
     s = settings
@@ -411,7 +411,7 @@ def solve_by_ipopt(
     return inputs.reshape(-1, 2) if is_solved else None
 
 
-@lru_cache(maxsize=256)
+@lru_cache
 def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
     """The problem in symbols, and its solver."""
     s = settings
