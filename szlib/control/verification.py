@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,9 +63,9 @@ class Rows(NamedTuple):
 
     def is_hard(self, s: MPCSettings) -> bool:
         """True if no price can buy a violation, by the settings `s`."""
-        if self.level is None or s.decay_price == np.inf:
+        if self.level is None or s.decay_price == inf:
             return self.level in (None, Priority.DECAY)
-        return self.level < Priority.ZONE + (s.zone_price == np.inf)
+        return self.level < Priority.ZONE + (s.zone_price == inf)
 
 
 def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
@@ -96,7 +97,7 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
     if s.terminal == "rest":
         speed = np.abs(velocity).max(axis=1)
         is_end = np.arange(s.N) == s.N - 1
-        yield Rows(None, "end", 0, np.where(is_end, -speed, np.inf)[None])
+        yield Rows(None, "end", 0, np.where(is_end, -speed, inf)[None])
 
 
 @dataclass(frozen=True)
@@ -146,12 +147,11 @@ def verify_step(step: Any) -> Report:
     path = step.carry(way).points
     within = path[:_SAMPLES], way.times[:_SAMPLES]
     of_disc = _measure(scene, *within, is_barrier=True)
-    gap = _measure(scene, *within).min(initial=np.inf)
-    of_zones = of_disc[: len(scene.people)].min(initial=np.inf) + scene.settings.eps
-    solids = scene.solids
-    if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
-        gap = -np.inf
-    least = of_disc[:, [0, -1]].min(initial=np.inf)
+    gap = _measure(scene, *within).min(initial=inf)
+    of_zones = of_disc[: len(scene.people)].min(initial=inf) + scene.settings.eps
+    if shapely.distance(scene.solids, shapely.Point(path[0])) == 0:
+        gap = -inf
+    least = of_disc[:, [0, -1]].min(initial=inf)
     lowest = float(min(least, gap, of_zones))
     slack = max(0.0, -worst.value)
     feasible = slack <= TOLERANCE
