@@ -232,7 +232,6 @@ class StepClock:
         n_held = 100 * ceil(OLDEST_STATE / dt)
         self._held = deque[tuple[Array, float]](maxlen=n_held)
         self._periods = deque[float](maxlen=RATE_STEPS)
-        self._called = 0.0
         self._goal = (inf, inf)
         self._nearest = inf
         self._remaining = inf
@@ -258,12 +257,12 @@ class StepClock:
         elif self.has_begun:
             self.now += self._dt
         if self.has_begun:
-            back = max(0.0, last - self.now)
-            if back:
+            self._elapsed = self.now - last
+            if self._elapsed < 0:
                 faults.append(
-                    f"the clock went back by {back:.3g} s; nobody is forgotten"
+                    f"the clock went back by {-self._elapsed:.3g} s; nobody is forgotten"
                 )
-            self._elapsed = self._dt if back else self.now - last
+                self._elapsed = self._dt
             self._held.append((self._control, self._elapsed))
             self._periods.append(called - self._called if is_timed else self._elapsed)
         self._called = called
