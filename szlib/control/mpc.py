@@ -447,20 +447,19 @@ class MPCCBF(Controller):
         s = self._s if is_point else self.settings
         fixed = self._fixed if is_point else self._fixed_of_disc
         people = tracked.people
-        groups = list[Group]()
+        zones = Obstacles((), s.r_robot)
         found = tuple([self.zone_of(each) for each in people])
         if people:
-            placed = list[float]()
-            for zone, each in zip(found, people, strict=True):
-                heading = each.heading or 0.0
-                placed += Zone.place(zone, each.position, heading, each.velocity)
-            numbers = np.array(placed).reshape(len(people), -1)
+            placed = [
+                Zone.place(zone, each.position, each.heading or 0.0, each.velocity)
+                for zone, each in zip(found, people, strict=True)
+            ]
+            numbers = np.array(placed)
             if [each for each in people if each.prediction]:
                 knots = [list_knots(each, s) for each in people]
                 numbers = np.hstack([numbers, knots])
             offsets = np.array(len(people) * [s.r_robot + s.eps])
-            groups.append(Group(Zone, numbers, offsets))
-        zones = Obstacles(tuple(groups), s.r_robot)
+            zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 
     def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
@@ -530,7 +529,6 @@ class MPCCBF(Controller):
         people : everybody who is present.
         """
         scene = self._ask(state, goal, people)
-        limit = self._s.v_max
         *at, vx, vy = scene.state
         for fault, place, h in (
             ("the run starts in violation", at, scene.barriers.h(*at)),
@@ -543,9 +541,9 @@ class MPCCBF(Controller):
                 raise SolverError(
                     f"{fault}: h = {h[i]:.3f} m for {scene.name(i)} at {place}; choose a place where h >= 0"
                 )
-        if hypot(vx, vy) > limit:
+        if hypot(vx, vy) > self._s.v_max:
             raise SolverError(
-                f"the run starts at {hypot(vx, vy):.3f} m/s; the limit is {limit} m/s"
+                f"the run starts at {hypot(vx, vy):.3f} m/s; the limit is {self._s.v_max} m/s"
             )
 
 
