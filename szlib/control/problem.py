@@ -72,10 +72,9 @@ def build_motion(settings: MPCSettings) -> Motion:
     weights = ca.DM(np.column_stack([np.zeros(4), np.outer(s.Q, lengths[:-1]), s.P]))
     error = x - ca.repmat(ca.vertcat(given[4:6], 0, 0), 1, s.N + 1)
     cost = ca.dot(weights, error**2) + ca.dot(ca.DM(np.outer(s.R, lengths)), inputs**2)
-    if s.jerk_weight:
-        change = inputs - ca.horzcat(given[6:], inputs[:, :-1])
-        by_jerk = np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)
-        cost += ca.dot(ca.DM(by_jerk), change**2)
+    change = inputs - ca.horzcat(given[6:], inputs[:, :-1])
+    by_jerk = np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)
+    cost += ca.dot(ca.DM(by_jerk), change**2)
     return Motion(inputs, given, x, cost)
 
 
