@@ -13,11 +13,11 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.checks import Array, require
+from ..core.checks import Array
 from ..core.errors import SolverError
 from .obstacles import Path
 from .people import Person, check_finite
-from .settings import MPCSettings
+from .settings import MPCSettings, check_argument
 
 
 class Robot(Protocol):
@@ -182,7 +182,7 @@ def as_controller(controller: Any) -> Controller:
         return controller
     expected = "an object with reset and step"
     has_step = hasattr(controller, "step")
-    require(has_step, "controller", controller, expected, SolverError)
+    check_argument(has_step, "controller", controller, expected)
     found = Controller()
     for name in ("reset", "step", "settings", "zone", "walls", "obstacles", "robot"):
         value = getattr(controller, name, None)
@@ -251,7 +251,7 @@ class StepClock:
         called = perf_counter()
         expected = "given with `stamps`, by the same clock"
         faults = list[str]()
-        require(not is_timed or stamps is None, "now", now, expected, SolverError)
+        check_argument(not is_timed or stamps is None, "now", now, expected)
         if now is not None:
             self.now = check_finite("now", now)
         elif self.has_begun:
@@ -308,7 +308,7 @@ class StepClock:
         """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
         spans = list[tuple[Array, float]]()
         expected = f"0 to {OLDEST_STATE:g} s"
-        require(0 <= age <= OLDEST_STATE, "state_age", age, expected, SolverError)
+        check_argument(0 <= age <= OLDEST_STATE, "state_age", age, expected)
         for control, held in reversed(self._held):
             if age <= 0:
                 break

@@ -52,7 +52,6 @@ from ..core.checks import (
     check_number,
     check_point,
     check_vector,
-    require,
 )
 from ..core.errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
@@ -85,7 +84,7 @@ from .problem import (
     plan_braking,
     solve_by_ipopt,
 )
-from .settings import TOLERANCE, MPCSettings
+from .settings import TOLERANCE, MPCSettings, check_argument
 from .step import Scene, Status, Step
 from .verification import AT_REST
 from .walls import find_solids, read_walls
@@ -473,7 +472,7 @@ class MPCCBF(Controller):
             corners = check_array("route", route, (..., 2))
             is_line = corners.ndim < 3
             expected = "corners, shape (m, 2)"
-            require(is_line, "route", corners.shape, expected, SolverError)
+            check_argument(is_line, "route", corners.shape, expected)
             heading = self._ways.follow(at, goal, corners)
         if not heading and (route is not None or s.lookahead < inf):
             groups = [person.group for person in scene.people]
@@ -535,7 +534,7 @@ class MPCCBF(Controller):
             ("the goal cannot be reached", scene.goal, scene.h_of_goal),
         ):
             is_free = not scene.is_solid(*place)
-            require(is_free, "start and goal", place, "outside of solids", SolverError)
+            check_argument(is_free, "start and goal", place, "outside of solids")
             if (h < 0).any():
                 i = int(h.argmin())
                 raise SolverError(

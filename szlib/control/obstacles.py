@@ -25,10 +25,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.checks import Array, check_array, require
-from ..core.errors import SolverError
+from ..core.checks import Array, check_array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .settings import TOLERANCE, MPCSettings
+from .settings import TOLERANCE, MPCSettings, check_argument
 
 # Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre.
 SHORTEST_WALL = 1e-3
@@ -171,7 +170,7 @@ def check_wall(wall: ArrayLike) -> Array:
     ends = check_array("a wall", wall, (2, 2))
     is_long = np.hypot(*(ends[1] - ends[0])) >= SHORTEST_WALL
     expected = f"two different end points, at least {SHORTEST_WALL} m apart"
-    require(is_long, "a wall", ends.tolist(), expected, SolverError)
+    check_argument(is_long, "a wall", ends.tolist(), expected)
     return ends
 
 
@@ -461,8 +460,7 @@ class HalfPlane(Obstacle):
         x, y = check_array("point", point, (2,)).tolist()
         nx, ny = check_array("normal", normal, (2,)).tolist()
         length = hypot(nx, ny)
-        if length == 0:
-            raise SolverError(f"normal must have a direction; got {normal!r}")
+        check_argument(length > 0, "normal", normal, "a direction")
         super().__init__(x, y, nx / length, ny / length)
 
     @staticmethod
@@ -756,5 +754,5 @@ def restore(content: dict[str, Any]) -> Obstacle:
     expected = (
         "that of a class of obstacles, which must be defined before the file is read"
     )
-    require(kind, "the kind of an obstacle", content["kind"], expected, SolverError)
+    check_argument(kind, "the kind of an obstacle", content["kind"], expected)
     return rebuild(kind, content["numbers"])

@@ -34,11 +34,10 @@ from ..core.checks import (
     check_array,
     check_number,
     check_point,
-    require,
 )
 from ..core.errors import SolverError, ZoneError
 from ..zones.ellipses import Ellipse
-from .settings import MPCSettings
+from .settings import MPCSettings, check_argument
 
 # Below this speed a person counts as standing, to allow for a tracker's noise [m/s] (assumed).
 STANDING_SPEED = 0.1
@@ -121,7 +120,7 @@ class Prediction:
             f"({n},) or ({n}, 2, 2)"
         )
         given = self.times, self.spread
-        require(is_later and is_spread, "a prediction", given, expected, SolverError)
+        check_argument(is_later and is_spread, "a prediction", given, expected)
         spread = np.broadcast_to(spread, n)
         vars(self).update(times=times, positions=positions, spread=spread)
 
@@ -186,7 +185,7 @@ def predict(
     positions = check_array("positions", positions, (n, np.size(times), 2))
     spreads = spreads if spreads.ndim else np.full(n, spreads)
     expected = f"a number, or one for each of {n} people"
-    require(len(spreads) == n, "spread", spreads.shape, expected, SolverError)
+    check_argument(len(spreads) == n, "spread", spreads.shape, expected)
     return [
         Person((x, y), (vx, vy), prediction=Prediction(times, xy, own))
         for (x, y, vx, vy), xy, own in zip(rows, positions, spreads, strict=True)
@@ -249,8 +248,7 @@ class Person:
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
         is_one = isinstance(self.prediction, Prediction | None)
-        name = "prediction"
-        require(is_one, name, self.prediction, "a Prediction", SolverError)
+        check_argument(is_one, "prediction", self.prediction, "a Prediction")
 
     @property
     def stands(self) -> bool:

@@ -14,6 +14,8 @@ import numpy as np
 from ..core.checks import Array, check_array, check_number, require
 from ..core.errors import SolverError
 
+# Raises SolverError: "`name` must be `expected`; got `value`".
+check_argument = partial(require, error=SolverError)
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
@@ -154,18 +156,18 @@ class MPCSettings:
                 if name in _LIMITS.split() and value == inf:
                     continue
                 numbers = check_array(name, value, shape)
-                require(holds(numbers).all(), name, value, expected, SolverError)
+                check_argument(holds(numbers).all(), name, value, expected)
                 put(name, tuple(numbers.tolist()) if shape else float(numbers))
         for name in _COUNTS:
             value = getattr(self, name)
             is_count = isinstance(value, int | np.integer) and value >= 1
-            require(is_count, name, value, "a whole number >= 1", SolverError)
+            check_argument(is_count, name, value, "a whole number >= 1")
         for name, choice in _CHOICES.items():
             value = getattr(self, name)
             allowed = get_args(choice)
             expected = " or ".join(map(repr, allowed))
             is_allowed = isinstance(value, str | bool | np.bool_) and value in allowed
-            require(is_allowed, name, value, expected, SolverError)
+            check_argument(is_allowed, name, value, expected)
         lengths = check_array("grid", self.grid, (np.size(self.grid),))
         grid = tuple(lengths.astype(int).tolist())
         put("grid", grid)
@@ -174,13 +176,11 @@ class MPCSettings:
             is_grid = grid[0] == 1 == min(grid) and self.terminal == "none"
             is_grid &= grid == tuple(lengths.tolist())
             expected = "whole numbers >= 1, the first 1, and no terminal condition"
-            require(is_grid, "grid", grid, expected, SolverError)
+            check_argument(is_grid, "grid", grid, expected)
             put("N", len(grid))
         if grid or self.terminal != "none":
             put("N_h", self.N)
-        require(
-            self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}", SolverError
-        )
+        check_argument(self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}")
 
     @classmethod
     def paper(cls, **changes: Any) -> MPCSettings:
