@@ -47,18 +47,16 @@ def _project(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> tuple[Any, .
     return length, dx * uy - dy * ux, dx * ux + dy * uy
 
 
-def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
-    """Approximate distance of (`x`, `y`) to the segment (`xa`, `ya`) to (`xb`, `yb`) [m] (paper, eq. 3-5)."""
-    length, g, along = _project(x, y, xa, ya, xb, yb)
+def segment_formula(x: Any, y: Any, *ends: Any) -> Any:
+    """Approximate distance of (`x`, `y`) to the segment with these `ends` (xa, ya, xb, yb) [m] (eq. 3-5)."""
+    length, g, along = _project(x, y, *ends)
     t = ((length / 2) ** 2 - along**2 - g**2) / length
     return (g**2 + ((abs(t) - t) / 2) ** 2) ** 0.5
 
 
-def euclidean_segment_formula(
-    x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any
-) -> Any:
-    """Euclidean distance of (`x`, `y`) to the segment from (`xa`, `ya`) to (`xb`, `yb`) [m]."""
-    length, g, along = _project(x, y, xa, ya, xb, yb)
+def euclidean_segment_formula(x: Any, y: Any, *ends: Any) -> Any:
+    """Euclidean distance of (`x`, `y`) to the segment with the `ends` (xa, ya, xb, yb) [m]."""
+    length, g, along = _project(x, y, *ends)
     beyond = abs(along) - length / 2
     return (g**2 + ((abs(beyond) + beyond) / 2) ** 2) ** 0.5
 
@@ -135,8 +133,8 @@ def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     [0.5, 0.5]
     """
     xy = check_array("points", points, (..., 2))
-    (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
-    return np.asarray(segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
+    ends = check_wall([np.asarray(a), np.asarray(b)])
+    return np.asarray(segment_formula(xy[..., 0], xy[..., 1], *ends.ravel()))
 
 
 def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
@@ -344,10 +342,9 @@ class Zone(Obstacle):
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """See `Obstacle.distance`: approximate, from the sum of focal distances."""
-        xa, ya, xb, yb, a, _, _, vx, vy, *knots = numbers
+        vx, vy, *knots = numbers[7:]
         dx, dy, growth = _drift(t, knots)
-        focal = ellipse_formula(x - dx - t * vx, y - dy - t * vy, xa, ya, xb, yb, a)
-        return focal - growth
+        return ellipse_formula(x - dx - t * vx, y - dy - t * vy, *numbers[:5]) - growth
 
     @staticmethod
     def gap(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
