@@ -162,7 +162,7 @@ class Program(LinearProblem):
         self.prices = np.zeros_like(self.lower)
         self.near[self.first :] = -np.minimum(change, NEAR)[k]
         zone_price = s.zone_price if s.zone_price < inf else 0.0
-        of_level = np.array([0.0, 0.0, zone_price, min(s.decay_price, HARD_PRICE)])
+        of_level = np.array([0.0, 0.0, zone_price, s.decay_price])
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
         self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
         self._is_hard = s.decay_price >= HARD_PRICE
@@ -397,7 +397,7 @@ class Planner:
             if is_converged or timed_out:
                 break
         self._on_speed[:] = program.multipliers
-        inputs = np.minimum(np.maximum(program.inputs, -s.a_max), s.a_max)
+        inputs = program.inputs.clip(-s.a_max, s.a_max)
         if not is_converged:
             states = build_horizon(s).states(np.array(question.state), inputs)
             inputs = follow_velocities(s, question.state[2:], states[1:, 2:])
