@@ -74,20 +74,17 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
     `h` are the barriers there, and `gaps` those to bodies less `body_gap`, shape (n, N+1) each [m].
     """
     s = scene.settings
-    lengths = np.array(scene.settings.step_lengths)
+    lengths = np.array(s.step_lengths)
     first = 0
     stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
     for kind, _, offsets in scene.barriers.groups:
         own = h[first : first + len(offsets)]
         falls = own[:, 1:] - (1 - s.gamma) ** lengths * own[:, :-1]
+        floors = own[:, 1 : s.N_h + 1]
         if kind.priority == Priority.WALL:
             floors = own[:, 1:] - stop**lengths * own[:, :-1]
-            yield Rows(Priority.WALL, kind.kind, first, floors)
-        else:
-            last = s.N_h if kind.has_barrier else s.N
-            yield Rows(kind.priority, kind.kind, first, own[:, 1 : last + 1])
-        if kind.has_barrier:
-            yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
+        yield Rows(kind.priority, kind.kind, first, floors)
+        yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
         first += len(offsets)
     if len(gaps):
         yield Rows(Priority.BODY, "body", 0, gaps[:, 1:])
@@ -135,15 +132,17 @@ class Sampled(NamedTuple):
 def verify_step(step: Any) -> Report:
     """Check the plan of a `step` (a `Step`), and its claims."""
     scene = step.scene
-    s = step.asked.settings
+    asked = step.asked
+    s = asked.settings
     x = np.asarray(step.planned, float)
     lengths = np.array(s.step_lengths)
-    way = _sample(np.array(step.asked.state), step.inputs, s.dt * lengths)
-    h = _measure(step.asked, x[:, :2], way.times[::PIECES], is_barrier=True)
+    way = _sample(np.array(asked.state), step.inputs, s.dt * lengths)
+    at = x[:, :2], way.times[::PIECES]
+    h = _measure(asked, *at, is_barrier=True)
     residual = h[:, 1:] - (1 - s.gamma) ** lengths * h[:, :-1]
-    gaps = _measure(step.asked, x[:, :2], way.times[::PIECES])
-    rows = list_rows(step.asked, x, h, gaps[: len(scene.people)] - s.body_gap)
-    worst = _find_worst(step.asked, (each for each in rows if each.is_hard(s)))
+    gaps = _measure(asked, *at)
+    rows = list_rows(asked, x, h, gaps[: len(scene.people)] - s.body_gap)
+    worst = _find_worst(asked, (each for each in rows if each.is_hard(s)))
     path = step.carry(way).points
     within = path[:_SAMPLES], way.times[:_SAMPLES]
     of_disc = _measure(scene, *within, is_barrier=True)
