@@ -530,7 +530,11 @@ class MPCCBF(Controller):
         *at, vx, vy = scene.state
         for fault, place, h in (
             ("the run starts in violation", at, scene.barriers.h(*at)),
-            ("the goal cannot be reached", scene.goal, scene.h_of_goal),
+            (
+                "the goal cannot be reached",
+                scene.goal,
+                scene.find_standing_h(*scene.goal),
+            ),
         ):
             is_free = not scene.is_solid(*place)
             check_argument(is_free, "start and goal", place, "outside of solids")

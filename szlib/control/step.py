@@ -74,14 +74,10 @@ class Scene(NamedTuple):
         return h
 
     @property
-    def h_of_goal(self) -> Array:
-        """Barriers at the goal, shape (obstacles,) [m]; inf for people who walk."""
-        return self.find_standing_h(*self.goal)
-
-    @property
     def goal_blocked(self) -> bool:
         """True if h < 0 at the goal, because of something fixed or of a person who stands; or in a solid."""
-        return self.is_solid(*self.goal) or bool((self.h_of_goal < 0).any())
+        h = self.find_standing_h(*self.goal)
+        return self.is_solid(*self.goal) or bool((h < 0).any())
 
     def is_solid(self, x: float, y: float) -> bool:
         """True if walls enclose the place (`x`, `y`) [m]."""
