@@ -135,6 +135,8 @@ def walls_from_map(
     ([4.0, 0.0], [10.0, 2.0])
     >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), walls=walls)
     """
+    within = check_number("simplify", simplify)
+    check_argument(within >= 0, "simplify", within, "at least 0")
     what = "the map"
     folder = Path(path).parent
     try:
@@ -163,13 +165,13 @@ def walls_from_map(
         grey = np.asarray(picture.convert("RGB"), float).mean(axis=2)
         p = (grey if entries["negate"] else 255 - grey) / 255
         is_solid = (p >= free) if unknown else (p > occupied)
+        return walls_from_grid(is_solid[::-1], side, origin, simplify=within)
     # whatever YAML, Pillow and NumPy say of a bad file
     except Exception as fault:
         expected = "a YAML file of map_server, whole, with an opaque PGM or PNG picture"
         raise DataError(
             f"{printable(path)}: {what} cannot be read: {fault}; expected {expected}"
         ) from fault
-    return walls_from_grid(is_solid[::-1], side, origin, simplify=simplify)
 
 
 def walls_from_grid(
