@@ -324,8 +324,7 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        barriers = scene.zones.joined(self._fixed)
-        question = Question(state, heading.target, last, barriers)
+        question = Question(state, heading.target, last, scene.barriers)
         guess = self._plan + self._change
         if s.solver == "ipopt":
             near = self._planner.keep_reachable(question, guess)
@@ -407,7 +406,7 @@ class MPCCBF(Controller):
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
         s = self._s
-        horizon = build_horizon(self._s)
+        horizon = build_horizon(s)
         states = horizon.states(np.array(scene.state), inputs)
         bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
         followed = Path(states[:, :2], horizon.times, bows)
@@ -482,8 +481,7 @@ class MPCCBF(Controller):
             target = x + vx * time / 2, y + vy * time / 2
         elif scene.people and not (heading and heading.ways):
             zones = scene.zones.groups[0].numbers.tolist()
-            fixed = self._fixed
-            target = find_target(at, target, zones, fixed, s)
+            target = find_target(at, target, zones, self._fixed, s)
         if heading:
             return heading._replace(target=target)
         return Heading(target, dist(at, goal))

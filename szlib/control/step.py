@@ -212,7 +212,7 @@ class Step:
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """What `h` belongs to: the `Zone` of each person, then everything fixed."""
-        return self.scene.zones.items + self.scene.fixed.items
+        return self.scene.barriers.items
 
     @cached_property
     def h(self) -> Array:
