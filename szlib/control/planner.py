@@ -71,8 +71,13 @@ _SOLVED = 1
 _VIOLATED = 2
 # No regularisation of convex programs; beside the exact penalty, a negligible quadratic one.
 # A program of ordinary crowds takes at most some 120 iterations, one that many people overlap 10,000.
-_DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3, "eq_reduction": -1}
-_DAQP["iter_limit"] = 1000
+_DAQP = {
+    "primal_tol": 1e-9,
+    "eps_prox": 0.0,
+    "rho_soft": 1e3,
+    "eq_reduction": -1,
+    "iter_limit": 1000,
+}
 
 
 class Plan(NamedTuple):
