@@ -241,9 +241,8 @@ class Map:
         self.is_reached = bool(self.is_near[*self.find_cell(goal)])
         self.end = self.centers(cell)
         cost = 1 + price.ravel()
-        i, j = self._pairs
-        weights = self._lengths / speed * (cost[i] + cost[j]) / 2
-        graph = csr_array((weights, (i, j)), shape=2 * cost.shape)
+        weights = self._lengths / speed * cost[self._pairs].mean(axis=0)
+        graph = csr_array((weights, self._pairs), shape=2 * cost.shape)
         number = np.ravel_multi_index(cell, self.shape)
         far, self._next = dijkstra(graph, False, number, return_predecessors=True)
         self.seconds_to_goal = far.reshape(self.shape)
