@@ -168,21 +168,19 @@ def list_conditions(
     With the floors of `szlib.control.planner` if it `has_floors`.
     """
     s = settings
-    lengths = settings.step_lengths
-    found = list[Condition]()
-    stop = min(1.0, s.a_max * s.dt / s.v_max)
+    lengths = s.step_lengths
     if not kind.has_barrier:
         return (Condition(kind.priority, (0.0,) * s.N),)
-    is_wall = has_floors and kind.priority == Priority.WALL
-    if not (is_wall and stop <= s.gamma + TOLERANCE and s.N_h == s.N):
-        decay = tuple((1 - s.gamma) ** m for m in lengths[: s.N_h])
-        found.append(Condition(Priority.DECAY, decay))
-    if is_wall:
-        stops = tuple((1 - stop) ** m for m in lengths)
-        found.append(Condition(Priority.WALL, stops))
-    elif has_floors:
-        found.append(Condition(kind.priority, (0.0,) * s.N_h))
-    return tuple(found)
+    falls = tuple((1 - s.gamma) ** m for m in lengths[: s.N_h])
+    decay = Condition(Priority.DECAY, falls)
+    if not has_floors:
+        return (decay,)
+    if kind.priority > Priority.WALL:
+        return decay, Condition(kind.priority, (0.0,) * s.N_h)
+    stop = min(1.0, s.a_max * s.dt / s.v_max)
+    floor = Condition(Priority.WALL, tuple((1 - stop) ** m for m in lengths))
+    is_implied = stop <= s.gamma + TOLERANCE and s.N_h == s.N
+    return (floor,) if is_implied else (decay, floor)
 
 
 def _write_conditions(
