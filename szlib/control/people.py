@@ -259,18 +259,13 @@ class Person:
         """The same person, `seconds` later, as predicted, but no farther from the origin than `LARGEST`."""
         if not seconds or (self.stands and self.prediction is None):
             return self
-        x, y = self.position
-        vx, vy = self.velocity
-        later = self.prediction
-        x = x + vx * seconds
-        y = y + vy * seconds
-        if later is not None:
-            dx, dy, _ = later.sample(self, np.array([seconds]))[0].tolist()
-            x = x + dx
-            y = y + dy
-            later = later.later(seconds)
-        person = self.at([max(-LARGEST, min(each, LARGEST)) for each in (x, y)])
-        vars(person).update(prediction=later)
+        position = self.position + seconds * np.array(self.velocity)
+        prediction = self.prediction
+        if prediction is not None:
+            position += prediction.sample(self, np.array([seconds]))[0, :2]
+            prediction = prediction.later(seconds)
+        person = self.at(position.clip(-LARGEST, LARGEST))
+        vars(person).update(prediction=prediction)
         return person
 
     def at(self, position: ArrayLike) -> Person:
