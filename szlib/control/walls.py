@@ -211,9 +211,11 @@ def walls_from_grid(
     expected = "truth values of shape (rows, columns), such as grid > 65"
     is_grid = cells.ndim == 2 and cells.dtype == bool
     check_argument(is_grid, "occupied", occupied, expected)
-    edges = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    (row, begin), end = (edges > 0).nonzero(), (edges < 0).nonzero()[1]
-    outlines = shapely.union_all(shapely.box(begin, row, end, row + 1))
+    # edges come in pairs: where a run of occupied cells begins, and where it ends
+    row, edge = np.diff(cells, prepend=False, append=False).nonzero()
+    low = row[::2]
+    runs = shapely.box(edge[::2], low, edge[1::2], low + 1)
+    outlines = shapely.union_all(runs)
     c = side * cos(yaw)
     s = side * sin(yaw)
     turn = [c, -s, s, c, x, y]
