@@ -281,8 +281,7 @@ class DifferentialDrive(MPCCBF):
         radius = s.r_robot + (s.eps + self.ahead + self.chord_error)
         self.goal_clearance = radius + self.ahead
         self._wheels = _Wheels(self.ahead, self.v_max)
-        v_max = self.v_max
-        return replace(s, r_robot=radius, eps=0.0, v_max=v_max, margin="euclidean")
+        return replace(s, r_robot=radius, eps=0.0, v_max=self.v_max, margin="euclidean")
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""

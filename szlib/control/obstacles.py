@@ -277,7 +277,7 @@ class Obstacle:
         numbers : of the obstacles, shape (n, m).
         offsets : distances, shape (n,) [m].
         """
-        everywhere = np.full((len(numbers), 2), np.inf)
+        everywhere = np.full((len(numbers), 2), inf)
         return -everywhere, everywhere
 
     def margin(self, settings: MPCSettings) -> float:

@@ -348,7 +348,7 @@ class Step:
     def _list_notes(self) -> list[str]:
         """What else has to be known, and what would help."""
         scene = self.scene
-        s = self.scene.settings
+        s = scene.settings
         worst = self.violations
         falls = self.residual.min(axis=1)
         slowest = scene.name(int(falls.argmin())) if len(falls) else ""
