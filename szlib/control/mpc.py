@@ -409,10 +409,11 @@ class MPCCBF(Controller):
         horizon = build_horizon(s)
         states = horizon.states(np.array(scene.state), inputs)
         bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
-        followed = Path(states[:, :2], horizon.times, bows)
         braking = plan_braking(s, states[-1, 2:].tolist())[0]
         rest = find_stopping_path(states[-1].tolist(), braking, s)
-        return followed.joined(rest._replace(times=rest.times + horizon.times[-1]))
+        points = np.vstack([states[:, :2], rest.points[1:]])
+        times = np.append(horizon.times, horizon.times[-1] + rest.times[1:])
+        return Path(points, times, np.append(bows, rest.bows))
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc, if the point that is planned for goes along a `path`."""

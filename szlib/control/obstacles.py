@@ -484,11 +484,6 @@ class Path(NamedTuple):
     times: Array
     bows: Array
 
-    def joined(self, later: Path) -> Path:
-        """This path, and then a `later` one, which begins where and when this one ends."""
-        rest = later.points[1:], later.times[1:], later.bows
-        return Path._make(map(np.concatenate, zip(self, rest, strict=True)))
-
 
 class Bound(NamedTuple):
     """How near the robot comes to obstacles.
