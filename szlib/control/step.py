@@ -93,29 +93,6 @@ class Scene(NamedTuple):
         same = sum(each.kind == own.kind for each in before)
         return f"{own.kind} {same}{repr(own).removeprefix(own.kind)}"
 
-    def find_danger(self, path: Path, is_feasible: bool) -> str:
-        """Why a robot is not safe that goes along a `path` for a step; "" if it is.
-
-        `is_feasible` says whether its plan violates no row without a price.
-        h has the allowance eps on the way: it is for what a way cuts off a round zone.
-        """
-        if self.tracked.unknown:
-            return "the position of a person is unknown, so the robot comes to rest"
-        barriers = self.barriers
-        if self.is_solid(*path.points[0]):
-            return "the robot is inside of a solid wall"
-        x, y = path.points.T
-        now, then = barriers.h(x, y, path.times).T
-        if (now < -TOLERANCE).any():
-            return f"the robot is already too close to {self.name(int(now.argmin()))}"
-        if not is_feasible:
-            return "its plan is not feasible"
-        if (then < -TOLERANCE).any():
-            return f"it comes too close to {self.name(int(then.argmin()))}"
-        h = self.zones.bound(path, is_barrier=True).lower + self.settings.eps
-        is_safe = min(barriers.bound(path).lower, h) >= -TOLERANCE
-        return "" if is_safe else "its disc overlaps a body or a wall"
-
 
 @dataclass(frozen=True, repr=False)
 class Step:
@@ -304,7 +281,28 @@ class Step:
         return not self._find_danger()
 
     def _find_danger(self) -> str:
-        return self.scene.find_danger(self.path, self.feasible)
+        """Why this step is not `safe`; "" if it is.
+
+        h has the allowance eps on the way: it is for what a way cuts off a round zone.
+        """
+        scene = self.scene
+        path = self.path
+        barriers = scene.barriers
+        if scene.tracked.unknown:
+            return "the position of a person is unknown, so the robot comes to rest"
+        if scene.is_solid(*path.points[0]):
+            return "the robot is inside of a solid wall"
+        x, y = path.points.T
+        now, then = barriers.h(x, y, path.times).T
+        if (now < -TOLERANCE).any():
+            return f"the robot is already too close to {scene.name(int(now.argmin()))}"
+        if not self.feasible:
+            return "its plan is not feasible"
+        if (then < -TOLERANCE).any():
+            return f"it comes too close to {scene.name(int(then.argmin()))}"
+        h = scene.zones.bound(path, is_barrier=True).lower + scene.settings.eps
+        is_safe = min(barriers.bound(path).lower, h) >= -TOLERANCE
+        return "" if is_safe else "its disc overlaps a body or a wall"
 
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, from that of the point which is planned for; here it is the same."""
