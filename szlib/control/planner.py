@@ -258,10 +258,6 @@ class Program(LinearProblem):
         sums = np.bincount(self.levels, violated, len(Priority))[: Priority.DECAY]
         return tuple(sums.round(4).tolist())
 
-    def sum_cost(self) -> float:
-        """The cost of the plan, with the prices of what it violates."""
-        return float(self.cost[0] + np.maximum(self.lower, 0.0) @ self.prices)
-
 
 def _find_reach_time(s: MPCSettings) -> float:
     """Time to h = 0 at constant speed from which on no step of a plan can violate a row [s].
@@ -411,6 +407,8 @@ class Planner:
             program.evaluate()
             is_relaxed = is_relaxed or program.is_violated()
         violations = program.sum_violations() if is_relaxed else ()
-        is_compared = is_relaxed or s.lookahead < inf
-        cost = program.sum_cost() if is_compared else 0.0
+        cost = 0.0
+        if is_relaxed or s.lookahead < inf:  # it may be compared
+            of_rows = program.lower.clip(0.0) @ program.prices
+            cost = float(program.cost[0] + of_rows)
         return Plan(inputs, cost, violations, is_relaxed, timed_out)

@@ -112,8 +112,8 @@ class Way(NamedTuple):
 
     def at(self, times: Array) -> Array:
         """Where the robot is at these `times`, shape (n, 2) [m]; at the goal from its arrival on."""
-        x, y = (np.interp(times, self.times, each) for each in self.points.T)
-        return np.column_stack([x, y])
+        along = [np.interp(times, self.times, each) for each in self.points.T]
+        return np.column_stack(along)
 
 
 class Heading(NamedTuple):
