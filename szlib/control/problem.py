@@ -36,26 +36,17 @@ class Question(NamedTuple):
     barriers: Obstacles
 
 
-class Motion(NamedTuple):
-    """The motion and the cost of a plan, in symbols.
+@lru_cache
+def build_motion(settings: MPCSettings) -> tuple[Any, ...]:
+    """The motion of a double integrator, and the cost of a plan, for these `settings`, in symbols.
 
-    Attributes
-    ----------
+    Returns
+    -------
     inputs : u_0 .. u_{N-1}, shape (2, N).
     given : the state, the target, and the last input, 8 numbers.
     states : x_0 .. x_N, shape (4, N+1).
     cost : of the plan.
     """
-
-    inputs: Any
-    given: Any
-    states: Any
-    cost: Any
-
-
-@lru_cache
-def build_motion(settings: MPCSettings) -> Motion:
-    """The motion of a double integrator, and the cost, for these `settings`."""
     s = settings
     inputs = ca.SX.sym("u", 2, settings.N)
     given = ca.SX.sym("given", 8)
@@ -75,7 +66,7 @@ def build_motion(settings: MPCSettings) -> Motion:
     change = inputs - ca.horzcat(given[6:], inputs[:, :-1])
     by_jerk = np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)
     cost += ca.dot(ca.DM(by_jerk), change**2)
-    return Motion(inputs, given, x, cost)
+    return inputs, given, x, cost
 
 
 class Horizon(NamedTuple):
@@ -281,8 +272,8 @@ class LinearProblem:
 
     Attributes
     ----------
-    inputs, given, multipliers : of the plan, shape (N, 2); see `Motion`; of the speed limits, negative where
-        one holds. To be filled.
+    inputs, given, multipliers : of the plan, shape (N, 2); see `build_motion`; of the speed limits, negative
+        where one holds. To be filled.
     lower, upper, slopes : of the rows.
     hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
     first : number of rows before those of obstacles.
