@@ -469,23 +469,21 @@ class MPCCBF(Controller):
         heading = None
         if route is not None:
             corners = check_array("route", route, (..., 2))
-            is_line = corners.ndim < 3
             expected = "corners, shape (m, 2)"
-            check_argument(is_line, "route", corners.shape, expected)
+            check_argument(corners.ndim < 3, "route", corners.shape, expected)
             heading = self._ways.follow(at, goal, corners)
         if not heading and (route is not None or s.lookahead < inf):
             groups = [person.group for person in scene.people]
             heading = self._ways.find(at, goal, scene.zones, groups)
-        target = heading.target if heading else goal
+        heading = heading or Heading(goal, dist(at, goal))
+        target = heading.target
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max
             target = x + vx * time / 2, y + vy * time / 2
-        elif scene.people and not (heading and heading.ways):
+        elif scene.people and not heading.ways:
             zones = scene.zones.groups[0].numbers.tolist()
             target = find_target(at, target, zones, self._fixed, s)
-        if heading:
-            return heading._replace(target=target)
-        return Heading(target, dist(at, goal))
+        return heading._replace(target=target)
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.
