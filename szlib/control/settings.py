@@ -231,23 +231,18 @@ class MPCSettings:
         >>> settings.N, round(settings.times[-1], 6)
         (14, 3.0)
         """
-        grid = (1,) * 4 + (2,) * 4 + (3,) * 6
-        dt, v_max = (
-            check_number(name, changes.get(name, getattr(cls, name)))
-            for name in ("dt", "v_max")
-        )
-        reach = sum(grid) * dt * v_max
         own: dict[str, Any] = {
             "gamma": 0.1,
-            "grid": grid,
+            "grid": (1,) * 4 + (2,) * 4 + (3,) * 6,
             "jerk_weight": 6.0,
-            "lookahead": reach + 1.0,
             "decay_price": 10.0,
             "zone_price": 200.0,
             "body_gap": 0.2,
             "max_iterations": 8,
         }
-        return cls(**own | changes)
+        chosen = cls(**own | changes)
+        reach = chosen.times[-1] * chosen.v_max
+        return replace(chosen, lookahead=changes.get("lookahead", reach + 1.0))
 
     @cached_property
     def step_lengths(self) -> tuple[int, ...]:
