@@ -181,8 +181,7 @@ def as_controller(controller: Any) -> Controller:
     if isinstance(controller, Controller):
         return controller
     expected = "an object with reset and step"
-    has_step = hasattr(controller, "step")
-    check_argument(has_step, "controller", controller, expected)
+    check_argument(hasattr(controller, "step"), "controller", controller, expected)
     found = Controller()
     for name in ("reset", "step", "settings", "zone", "walls", "obstacles", "robot"):
         value = getattr(controller, name, None)
@@ -229,8 +228,7 @@ class StepClock:
         self._dt = dt
         self._elapsed = dt
         self.fault = ""
-        n_held = 100 * ceil(OLDEST_STATE / dt)
-        self._held = deque[tuple[Array, float]](maxlen=n_held)
+        self._held = deque[tuple[Array, float]](maxlen=100 * ceil(OLDEST_STATE / dt))
         self._periods = deque[float](maxlen=RATE_STEPS)
         self._goal = (inf, inf)
         self._nearest = inf

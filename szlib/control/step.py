@@ -350,13 +350,13 @@ class Step:
         worst = self.violations
         falls = self.residual.min(axis=1)
         slowest = scene.name(int(falls.argmin())) if len(falls) else ""
-        is_cut = s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE
         notes = {
             f"h of {slowest} falls faster than gamma = {s.gamma:g}, at its price; what helps: a "
             f"decay_price above {s.decay_price:g}": s.decay_price < inf
             and worst[Priority.DECAY] > TOLERANCE,
             f"it enters a zone by {worst[Priority.ZONE]:.2g} m, at its price; what helps: a zone_price above "
-            f"{s.zone_price:g}": is_cut,
+            f"{s.zone_price:g}": s.zone_price < inf
+            and worst[Priority.ZONE] > TOLERANCE,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
             "v_max": not self.passively_safe,
