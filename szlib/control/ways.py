@@ -177,7 +177,12 @@ class Map:
         wide = distance_transform_edt(self.free) * self.cell >= _DOOR
         self.is_narrow = self.free & (distance_transform_edt(~wide) * self.cell > _DOOR)
         self._parts, _ = label(self.free, np.ones((3, 3)))
-        self._link()
+        # pairs of free neighbours, in 16 directions
+        numbers = np.flatnonzero(self.free)
+        neighbours = numbers + (_NEIGHBOURS @ (self.shape[1], 1))[:, None]
+        direction, k = self.free.ravel()[neighbours].nonzero()
+        self._pairs = np.stack([numbers[k], neighbours[direction, k]])
+        self._lengths = self.cell * np.hypot(*_NEIGHBOURS[direction].T)
 
     def _cover(self, fixed: Obstacles) -> Mask:
         """Where h < 0. Each obstacle is measured in the cells of its box."""
@@ -199,14 +204,6 @@ class Map:
                 unsafe = kind.distance(x, y, 0.0, *numbers[which].T) < offsets[which]
                 covered[*cells[:, unsafe]] = True
         return covered
-
-    def _link(self) -> None:
-        """Find the pairs of free neighbours, in 16 directions, and their distances."""
-        numbers = np.flatnonzero(self.free)
-        neighbours = numbers + (_NEIGHBOURS @ (self.shape[1], 1))[:, None]
-        direction, k = self.free.ravel()[neighbours].nonzero()
-        self._pairs = np.stack([numbers[k], neighbours[direction, k]])
-        self._lengths = self.cell * np.hypot(*_NEIGHBOURS[direction].T)
 
     def centers(self, cells: ArrayLike) -> Array:
         """Centres of `cells`, shape (..., 2) [m]."""
