@@ -313,7 +313,8 @@ class WayFinder:
         m.blocked = ~m.free
         line = shapely.LineString(np.vstack([route, goal, goal]))
         piece = max(m.cell, line.length / _MOST_POINTS)
-        points = shapely.get_coordinates(shapely.segmentize(line, piece))
+        line = shapely.segmentize(line, piece) if line.length else line
+        points = shapely.get_coordinates(line)
         heading, is_seen = self._head_for(m, at, points)
         return heading if is_seen else None
 
