@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from itertools import accumulate
@@ -11,7 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..core.checks import Array, check_array, check_number, require
+from ..core.checks import check_array, check_number, require
 from ..core.errors import SolverError
 
 # Raises SolverError: "`name` must be `expected`; got `value`".
@@ -31,12 +30,13 @@ _CHOICES = {
 _COUNTS = "N", "N_h", "max_iterations"
 # settings that may be infinite
 _LIMITS = "lookahead decay_price zone_price time_limit deadline"
-# Ranges of numbers: as a check, in words, and the names of the settings that must lie in it.
-_RANGES: tuple[tuple[Callable[[Array], Any], str, str], ...] = (
-    (lambda v: v > 0, "positive", f"dt R a_max v_max zone_speed {_LIMITS}"),
-    (lambda v: v >= 0, "at least 0", "Q P jerk_weight r_robot eps body_gap"),
-    (lambda v: (v > 0) & (v <= 1), "in (0, 1]", "gamma"),
-    (lambda v: (v >= 0) & (v <= 0.5), "in [0, 0.5]", "head_on_share"),
+_POSITIVE = 5e-324  # the smallest positive float
+# Ranges of numbers: both ends, in words, and the names of the settings that must lie in it.
+_RANGES = (
+    (_POSITIVE, inf, "positive", f"dt R a_max v_max zone_speed {_LIMITS}"),
+    (0.0, inf, "at least 0", "Q P jerk_weight r_robot eps body_gap"),
+    (_POSITIVE, 1.0, "in (0, 1]", "gamma"),
+    (0.0, 0.5, "in [0, 0.5]", "head_on_share"),
 )
 # What the paper has instead of the default, and the settings whose default is not the paper's, by source.
 _PAPER: dict[str, Any] = {
@@ -149,14 +149,15 @@ class MPCSettings:
 
     def __post_init__(self) -> None:
         put = partial(object.__setattr__, self)
-        for holds, expected, names in _RANGES:
+        for least, most, expected, names in _RANGES:
             for name in names.split():
                 value = getattr(self, name)
                 shape = np.shape(getattr(MPCSettings, name))
                 if name in _LIMITS.split() and value == inf:
                     continue
                 numbers = check_array(name, value, shape)
-                check_argument(holds(numbers).all(), name, value, expected)
+                is_within = ((least <= numbers) & (numbers <= most)).all()
+                check_argument(is_within, name, value, expected)
                 put(name, tuple(numbers.tolist()) if shape else float(numbers))
         for name in _COUNTS:
             value = getattr(self, name)
@@ -265,9 +266,9 @@ class MPCSettings:
         value = getattr(self, name)
         if value == _PAPER.get(name):
             return "paper"
-        if value == getattr(MPCSettings, name):
-            of_name = (
-                each for each, names in _SOURCES.items() if name in names.split()
-            )
-            return next(of_name, "paper")
-        return "chosen"
+        if value != getattr(MPCSettings, name):
+            return "chosen"
+        for source, names in _SOURCES.items():
+            if name in names.split():
+                return source
+        return "paper"
