@@ -228,6 +228,7 @@ class StepClock:
         self._dt = dt
         self._elapsed = dt
         self.fault = ""
+        self._called = 0.0
         self._held = deque[tuple[Array, float]](maxlen=100 * ceil(OLDEST_STATE / dt))
         self._periods = deque[float](maxlen=RATE_STEPS)
         self._goal = (inf, inf)

@@ -633,7 +633,8 @@ class Obstacles(NamedTuple):
         length = np.hypot(*np.diff(path.points, axis=0).T).sum() + path.bows.sum()
         reach = length + self.speeds * np.ptp(path.times)
         measure = Obstacles.h if is_barrier else Obstacles.gaps
-        first = measure(self, *path.points[0], path.times[0])
+        x, y = path.points[0]
+        first = measure(self, x, y, path.times[0])
         near = self.select_near(first - reach)
         if not near.groups:
             return Bound()

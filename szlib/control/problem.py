@@ -424,7 +424,7 @@ def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
     for name, limit in (("cpu", s.time_limit), ("wall", s.deadline)):
         if limit < inf:
             of_ipopt[f"max_{name}_time"] = limit / 2
-    options = {
+    options: dict[str, Any] = {
         "expand": True,
         "print_time": False,
         "calc_lam_p": False,
