@@ -134,7 +134,7 @@ def verify_step(step: Any) -> Report:
     scene = step.scene
     asked = step.asked
     s = asked.settings
-    x = np.asarray(step.planned, float)
+    x = step.planned
     lengths = np.array(s.step_lengths)
     way = _sample(np.array(asked.state), step.inputs, s.dt * lengths)
     at = x[:, :2], way.times[::PIECES]
