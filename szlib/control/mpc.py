@@ -333,8 +333,7 @@ class MPCCBF(Controller):
                 return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
-            times = np.array(s.times)
-            targets = np.gradient(heading.ways[0].at(times), times, axis=0)[1:]
+            targets = np.gradient(heading.ways[0].at(s.times), s.times, axis=0)[1:]
             along_way = follow_velocities(s, state[2:], targets)
             other = self._planner.plan(question, along_way)
             plan = min(plan, other, key=lambda each: each.rank)

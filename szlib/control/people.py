@@ -144,7 +144,7 @@ class Prediction:
 
 def list_knots(person: Person, settings: MPCSettings) -> Array:
     """What `Zone` and `Body` of a `person` need for each interval of the horizon of these `settings`."""
-    times = np.array(settings.times)
+    times = settings.times
     offsets = np.zeros((settings.N + 1, 3))
     if person.prediction is not None:
         offsets = person.prediction.sample(person, times)

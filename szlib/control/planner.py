@@ -159,7 +159,7 @@ class Program(LinearProblem):
         super().__init__(settings, shapes, has_floors)
         s = settings
         k = self.steps
-        times = np.array(settings.times)
+        times = s.times
         # inputs change by 2 a_max at most on each axis
         change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
         self.near = np.full_like(self.lower, -inf)
@@ -338,7 +338,7 @@ class Planner:
         x, y = states[:, :2].T
         speed = np.hypot(*states[:, 2:].T).max()
         reach = (speed + barriers.speeds) * _find_reach_time(s)
-        travel = barriers.find_travel(x, y, np.array(s.times), s.body_gap)
+        travel = barriers.find_travel(x, y, s.times, s.body_gap)
         return np.asarray(travel.min(axis=1) - reach)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:

@@ -95,7 +95,7 @@ class Horizon(NamedTuple):
 @lru_cache
 def build_horizon(settings: MPCSettings) -> Horizon:
     """The matrices of the motion for these `settings`."""
-    times = np.array(settings.times)
+    times = settings.times
     past = np.tri(settings.N)
     dt = np.diff(times)
     ends = times[1:]
@@ -119,7 +119,8 @@ def follow_velocities(
     v = velocity
     slowest = hypot(*velocity)
     plan = list[Point]()
-    ends = zip(targets.tolist(), s.step_lengths, s.times[1:], strict=True)
+    times = s.times[1:].tolist()
+    ends = zip(targets.tolist(), s.step_lengths, times, strict=True)
     for (wx, wy), length, time in ends:
         dt = s.dt * length
         limit = max(s.v_max, slowest - s.a_max * time)
@@ -188,7 +189,7 @@ def _write_conditions(
     *own, offset = ca.vertsplit(numbers)
     h = [
         kind.distance(at[0, k], at[1, k], time, *own) - offset
-        for k, time in enumerate(s.times)
+        for k, time in enumerate(s.times.tolist())
     ]
     conditions = list_conditions(s, kind, has_floors)
     found = [

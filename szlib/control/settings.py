@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from itertools import accumulate
 from math import expm1, inf, log1p
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..core.checks import check_array, check_number, require
+from ..core.checks import Array, check_array, check_number, require
 from ..core.errors import SolverError
 
 # Raises SolverError: "`name` must be `expected`; got `value`".
@@ -229,7 +228,7 @@ class MPCSettings:
         --------
         >>> import szlib
         >>> settings = szlib.MPCSettings.among_people(v_max=1.3)
-        >>> settings.N, round(settings.times[-1], 6)
+        >>> settings.N, float(settings.times[-1].round(6))
         (14, 3.0)
         """
         own: dict[str, Any] = {
@@ -251,9 +250,9 @@ class MPCSettings:
         return self.grid or (1,) * self.N
 
     @cached_property
-    def times(self) -> tuple[float, ...]:
-        """Time of each state of the plan, from now, N+1 numbers [s]."""
-        return tuple(self.dt * k for k in accumulate(self.step_lengths, initial=0))
+    def times(self) -> Array:
+        """Time of each state of the plan, from now, shape (N+1,) [s]."""
+        return np.asarray(self.dt * np.cumsum((0, *self.step_lengths)))
 
     def badges(self) -> dict[str, str]:
         """The source of each value, by name.

@@ -211,7 +211,7 @@ class Step:
         scene = self.asked
         x = self.planned
         s = scene.settings
-        at = (*x.T[:2], np.array(s.times))
+        at = (*x.T[:2], s.times)
         bodies = find_bodies(scene.zones, s, as_predicted=True)
         return list(list_rows(scene, x, scene.barriers.h(*at), bodies.h(*at)))
 
@@ -265,8 +265,7 @@ class Step:
         Negative is an overlap.
         """
         x, y, *_ = self.predicted.T
-        times = np.array(self.scene.settings.times)
-        return self.scene.barriers.gaps(x, y, times)
+        return self.scene.barriers.gaps(x, y, self.scene.settings.times)
 
     @property
     def safe(self) -> bool:

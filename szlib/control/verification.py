@@ -293,7 +293,7 @@ def _find_places(
     steady = person.position + np.outer(times, person.velocity)
     if person.prediction is None or not as_predicted:
         return steady, np.zeros(len(steady))
-    samples = person.prediction.sample(person, np.array(s.times)).T
+    samples = person.prediction.sample(person, s.times).T
     dx, dy, growth = (np.interp(times, s.times, each) for each in samples)
     return steady + np.column_stack([dx, dy]), growth
 
