@@ -412,8 +412,7 @@ class Wall(Obstacle):
     @staticmethod
     def _travel(distance: Any, *numbers: Any) -> Any:
         """The s of d = s + s^2/L: it changes by no more than the robot moves (`differential_drive`)."""
-        xa, ya, xb, yb = numbers
-        length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+        length, _, _ = _project(0.0, 0.0, *numbers)
         return length / 2 * ((1 + 4 * distance / length) ** 0.5 - 1)
 
     @classmethod
