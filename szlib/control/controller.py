@@ -53,10 +53,9 @@ def advance(state: Array, control: Array, dt: float) -> Array:
     >>> advance(np.array([0.0, 0.0, 1.0, 0.0]), np.array([0.5, 0.0]), dt=2.0).tolist()
     [3.0, 0.0, 2.0, 0.0]
     """
-    (x, y, vx, vy), (ax, ay), half = state.tolist(), control.tolist(), 0.5 * dt**2
-    return np.array(
-        [x + dt * vx + half * ax, y + dt * vy + half * ay, vx + dt * ax, vy + dt * ay]
-    )
+    velocity = state[2:]
+    position = state[:2] + dt * velocity + 0.5 * dt**2 * control
+    return np.concatenate([position, velocity + dt * control])
 
 
 _MOST_PIECES = 64  # in which the way of a braking robot is looked at
