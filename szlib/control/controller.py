@@ -13,11 +13,11 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.checks import Array, require
+from ..core.checks import Array
 from ..core.errors import SolverError
 from .obstacles import Path
 from .people import Person, check_finite
-from .settings import MPCSettings
+from .settings import MPCSettings, check_argument
 
 
 class Robot(Protocol):
@@ -53,10 +53,9 @@ def advance(state: Array, control: Array, dt: float) -> Array:
     >>> advance(np.array([0.0, 0.0, 1.0, 0.0]), np.array([0.5, 0.0]), dt=2.0).tolist()
     [3.0, 0.0, 2.0, 0.0]
     """
-    (x, y, vx, vy), (ax, ay), half = state.tolist(), control.tolist(), 0.5 * dt**2
-    return np.array(
-        [x + dt * vx + half * ax, y + dt * vy + half * ay, vx + dt * ax, vy + dt * ay]
-    )
+    velocity = state[2:]
+    position = state[:2] + dt * velocity + 0.5 * dt**2 * control
+    return np.concatenate([position, velocity + dt * control])
 
 
 _MOST_PIECES = 64  # in which the way of a braking robot is looked at
@@ -181,8 +180,7 @@ def as_controller(controller: Any) -> Controller:
     if isinstance(controller, Controller):
         return controller
     expected = "an object with reset and step"
-    has_step = hasattr(controller, "step")
-    require(has_step, "controller", controller, expected, SolverError)
+    check_argument(hasattr(controller, "step"), "controller", controller, expected)
     found = Controller()
     for name in ("reset", "step", "settings", "zone", "walls", "obstacles", "robot"):
         value = getattr(controller, name, None)
@@ -229,10 +227,9 @@ class StepClock:
         self._dt = dt
         self._elapsed = dt
         self.fault = ""
-        n_held = 100 * ceil(OLDEST_STATE / dt)
-        self._held = deque[tuple[Array, float]](maxlen=n_held)
-        self._periods = deque[float](maxlen=RATE_STEPS)
         self._called = 0.0
+        self._held = deque[tuple[Array, float]](maxlen=100 * ceil(OLDEST_STATE / dt))
+        self._periods = deque[float](maxlen=RATE_STEPS)
         self._goal = (inf, inf)
         self._nearest = inf
         self._remaining = inf
@@ -252,18 +249,18 @@ class StepClock:
         called = perf_counter()
         expected = "given with `stamps`, by the same clock"
         faults = list[str]()
-        require(not is_timed or stamps is None, "now", now, expected, SolverError)
+        check_argument(not is_timed or stamps is None, "now", now, expected)
         if now is not None:
             self.now = check_finite("now", now)
         elif self.has_begun:
             self.now += self._dt
         if self.has_begun:
-            back = max(0.0, last - self.now)
-            if back:
+            self._elapsed = self.now - last
+            if self._elapsed < 0:
                 faults.append(
-                    f"the clock went back by {back:.3g} s; nobody is forgotten"
+                    f"the clock went back by {-self._elapsed:.3g} s; nobody is forgotten"
                 )
-            self._elapsed = self._dt if back else self.now - last
+                self._elapsed = self._dt
             self._held.append((self._control, self._elapsed))
             self._periods.append(called - self._called if is_timed else self._elapsed)
         self._called = called
@@ -309,7 +306,7 @@ class StepClock:
         """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
         spans = list[tuple[Array, float]]()
         expected = f"0 to {OLDEST_STATE:g} s"
-        require(0 <= age <= OLDEST_STATE, "state_age", age, expected, SolverError)
+        check_argument(0 <= age <= OLDEST_STATE, "state_age", age, expected)
         for control, held in reversed(self._held):
             if age <= 0:
                 break

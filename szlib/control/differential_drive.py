@@ -52,15 +52,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.checks import Array, check_array, check_number, check_vector, require
-from ..core.errors import SolverError
+from ..core.checks import Array, check_array, check_number, check_vector
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
 from .obstacles import Path, Point, find_bodies
 from .people import SpeedZone
 from .planner import Plan
 from .problem import follow_velocities
-from .settings import TOLERANCE, MPCSettings
+from .settings import TOLERANCE, MPCSettings, check_argument
 from .step import Scene, Status, Step
 from .verification import PIECES, Sampled
 from .ways import Heading
@@ -270,9 +269,9 @@ class DifferentialDrive(MPCCBF):
         turned = self.omega_max * s.dt
         ahead = self.ahead
         expected = f"in (0, pi/dt) = (0, {pi / s.dt:g})"
-        require(0 < turned < pi, "omega_max", self.omega_max, expected, SolverError)
+        check_argument(0 < turned < pi, "omega_max", self.omega_max, expected)
         expected = "positive, because the axle itself cannot move sideways"
-        require(ahead > 0, "ahead", ahead, expected, SolverError)
+        check_argument(ahead > 0, "ahead", ahead, expected)
         turn = 2 * sin(turned / 2) / s.dt
         if self.ahead == inf:
             self.ahead = s.v_max / turn
@@ -282,8 +281,7 @@ class DifferentialDrive(MPCCBF):
         radius = s.r_robot + (s.eps + self.ahead + self.chord_error)
         self.goal_clearance = radius + self.ahead
         self._wheels = _Wheels(self.ahead, self.v_max)
-        v_max = self.v_max
-        return replace(s, r_robot=radius, eps=0.0, v_max=v_max, margin="euclidean")
+        return replace(s, r_robot=radius, eps=0.0, v_max=self.v_max, margin="euclidean")
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
@@ -299,7 +297,7 @@ class DifferentialDrive(MPCCBF):
         """State and goal of the point, from those of the axle's middle."""
         old = check_array("state", state, (...,))
         expected = "(x, y, theta) or (x, y, theta, v, omega) of the axle's middle"
-        require(old.shape in ((3,), (5,)), "state", state, expected, SolverError)
+        check_argument(old.shape in ((3,), (5,)), "state", state, expected)
         if len(old) == 3:
             old = np.append(old, np.nan_to_num(self._command))
         self._own = own = self._clock.bring_forward(self.robot, old, age, old[3:])

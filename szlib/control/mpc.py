@@ -52,7 +52,6 @@ from ..core.checks import (
     check_number,
     check_point,
     check_vector,
-    require,
 )
 from ..core.errors import DataWarning, SolverError, warn
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
@@ -85,7 +84,7 @@ from .problem import (
     plan_braking,
     solve_by_ipopt,
 )
-from .settings import TOLERANCE, MPCSettings
+from .settings import TOLERANCE, MPCSettings, check_argument
 from .step import Scene, Status, Step
 from .verification import AT_REST
 from .walls import find_solids, read_walls
@@ -328,8 +327,7 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        barriers = scene.zones.joined(self._fixed)
-        question = Question(state, heading.target, last, barriers)
+        question = Question(state, heading.target, last, scene.barriers)
         guess = self._plan + self._change
         if s.solver == "ipopt":
             near = self._planner.keep_reachable(question, guess)
@@ -338,8 +336,7 @@ class MPCCBF(Controller):
                 return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
-            times = np.array(s.times)
-            targets = np.gradient(heading.ways[0].at(times), times, axis=0)[1:]
+            targets = np.gradient(heading.ways[0].at(s.times), s.times, axis=0)[1:]
             along_way = follow_velocities(s, state[2:], targets)
             other = self._planner.plan(question, along_way)
             plan = min(plan, other, key=lambda each: each.rank)
@@ -361,7 +358,7 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         control = plan.inputs[0]
-        is_wall_far, is_body_far = self._find_far(scene, control)
+        is_wall_far, is_body_far = self._find_far(scene)
         if is_wall_far and is_body_far:
             return False, (True, True)
         bodies = find_bodies(scene.zones, self.settings)
@@ -385,17 +382,16 @@ class MPCCBF(Controller):
         is_safe = rest[1].is_safe
         return True, (walls_safe, walls_safe and is_safe)
 
-    def _find_far(self, scene: Scene, control: Array) -> tuple[bool, bool]:
+    def _find_far(self, scene: Scene) -> tuple[bool, bool]:
         """Whether the robot can touch nothing fixed before it rests, and whether it can touch no body.
 
-        Within a step of `control` and the braking after it, it goes no farther than `reach`.
+        Within a step of any control and the braking after it, it goes no farther than `reach`.
         """
-        s, (x, y, vx, vy), (ax, ay) = self._s, scene.state, control.tolist()
-        last_vx = vx + s.dt * ax
-        last_vy = vy + s.dt * ay
-        stop = max(abs(last_vx), abs(last_vy)) / s.a_max
-        last = hypot(last_vx, last_vy)
-        reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
+        s = self._s
+        x, y, vx, vy = scene.state
+        fastest = hypot(vx, vy) + hypot(s.a_max, s.a_max) * s.dt
+        stop = fastest / s.a_max
+        reach = fastest * (s.dt + stop / 2) + _BRAKING_ERROR
         reach += s.r_robot - self.settings.r_robot
         contact = BODY_RADIUS + self.settings.r_robot + reach
         time = stop + 2 * s.dt
@@ -412,13 +408,14 @@ class MPCCBF(Controller):
     def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
         """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
         s = self._s
-        horizon = build_horizon(self._s)
+        horizon = build_horizon(s)
         states = horizon.states(np.array(scene.state), inputs)
         bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
-        followed = Path(states[:, :2], horizon.times, bows)
         braking = plan_braking(s, states[-1, 2:].tolist())[0]
         rest = find_stopping_path(states[-1].tolist(), braking, s)
-        return followed.joined(rest._replace(times=rest.times + horizon.times[-1]))
+        points = np.vstack([states[:, :2], rest.points[1:]])
+        times = np.append(horizon.times, horizon.times[-1] + rest.times[1:])
+        return Path(points, times, np.append(bows, rest.bows))
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc, if the point that is planned for goes along a `path`."""
@@ -450,20 +447,19 @@ class MPCCBF(Controller):
         s = self._s if is_point else self.settings
         fixed = self._fixed if is_point else self._fixed_of_disc
         people = tracked.people
-        groups = list[Group]()
+        zones = Obstacles((), s.r_robot)
         found = tuple([self.zone_of(each) for each in people])
         if people:
-            placed = list[float]()
-            for zone, each in zip(found, people, strict=True):
-                heading = each.heading or 0.0
-                placed += Zone.place(zone, each.position, heading, each.velocity)
-            numbers = np.array(placed).reshape(len(people), -1)
+            placed = [
+                Zone.place(zone, each.position, each.heading or 0.0, each.velocity)
+                for zone, each in zip(found, people, strict=True)
+            ]
+            numbers = np.array(placed)
             if [each for each in people if each.prediction]:
                 knots = [list_knots(each, s) for each in people]
                 numbers = np.hstack([numbers, knots])
             offsets = np.array(len(people) * [s.r_robot + s.eps])
-            groups.append(Group(Zone, numbers, offsets))
-        zones = Obstacles(tuple(groups), s.r_robot)
+            zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 
     def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
@@ -475,24 +471,21 @@ class MPCCBF(Controller):
         heading = None
         if route is not None:
             corners = check_array("route", route, (..., 2))
-            is_line = corners.ndim < 3
             expected = "corners, shape (m, 2)"
-            require(is_line, "route", corners.shape, expected, SolverError)
+            check_argument(corners.ndim < 3, "route", corners.shape, expected)
             heading = self._ways.follow(at, goal, corners)
         if not heading and (route is not None or s.lookahead < inf):
             groups = [person.group for person in scene.people]
             heading = self._ways.find(at, goal, scene.zones, groups)
-        target = heading.target if heading else goal
+        heading = heading or Heading(goal, dist(at, goal))
+        target = heading.target
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max
             target = x + vx * time / 2, y + vy * time / 2
-        elif scene.people and not (heading and heading.ways):
+        elif scene.people and not heading.ways:
             zones = scene.zones.groups[0].numbers.tolist()
-            fixed = self._fixed
-            target = find_target(at, target, zones, fixed, s)
-        if heading:
-            return heading._replace(target=target)
-        return Heading(target, dist(at, goal))
+            target = find_target(at, target, zones, self._fixed, s)
+        return heading._replace(target=target)
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.
@@ -533,22 +526,25 @@ class MPCCBF(Controller):
         people : everybody who is present.
         """
         scene = self._ask(state, goal, people)
-        limit = self._s.v_max
         *at, vx, vy = scene.state
         for fault, place, h in (
             ("the run starts in violation", at, scene.barriers.h(*at)),
-            ("the goal cannot be reached", scene.goal, scene.h_of_goal),
+            (
+                "the goal cannot be reached",
+                scene.goal,
+                scene.find_standing_h(*scene.goal),
+            ),
         ):
             is_free = not scene.is_solid(*place)
-            require(is_free, "start and goal", place, "outside of solids", SolverError)
+            check_argument(is_free, "start and goal", place, "outside of solids")
             if (h < 0).any():
                 i = int(h.argmin())
                 raise SolverError(
                     f"{fault}: h = {h[i]:.3f} m for {scene.name(i)} at {place}; choose a place where h >= 0"
                 )
-        if hypot(vx, vy) > limit:
+        if hypot(vx, vy) > self._s.v_max:
             raise SolverError(
-                f"the run starts at {hypot(vx, vy):.3f} m/s; the limit is {limit} m/s"
+                f"the run starts at {hypot(vx, vy):.3f} m/s; the limit is {self._s.v_max} m/s"
             )
 
 

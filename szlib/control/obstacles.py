@@ -25,10 +25,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.checks import Array, check_array, require
-from ..core.errors import SolverError
+from ..core.checks import Array, check_array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .settings import TOLERANCE, MPCSettings
+from .settings import TOLERANCE, MPCSettings, check_argument
 
 # Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre.
 SHORTEST_WALL = 1e-3
@@ -48,18 +47,16 @@ def _project(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> tuple[Any, .
     return length, dx * uy - dy * ux, dx * ux + dy * uy
 
 
-def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
-    """Approximate distance of (`x`, `y`) to the segment (`xa`, `ya`) to (`xb`, `yb`) [m] (paper, eq. 3-5)."""
-    length, g, along = _project(x, y, xa, ya, xb, yb)
+def segment_formula(x: Any, y: Any, *ends: Any) -> Any:
+    """Approximate distance of (`x`, `y`) to the segment with these `ends` (xa, ya, xb, yb) [m] (eq. 3-5)."""
+    length, g, along = _project(x, y, *ends)
     t = ((length / 2) ** 2 - along**2 - g**2) / length
     return (g**2 + ((abs(t) - t) / 2) ** 2) ** 0.5
 
 
-def euclidean_segment_formula(
-    x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any
-) -> Any:
-    """Euclidean distance of (`x`, `y`) to the segment from (`xa`, `ya`) to (`xb`, `yb`) [m]."""
-    length, g, along = _project(x, y, xa, ya, xb, yb)
+def euclidean_segment_formula(x: Any, y: Any, *ends: Any) -> Any:
+    """Euclidean distance of (`x`, `y`) to the segment with the `ends` (xa, ya, xb, yb) [m]."""
+    length, g, along = _project(x, y, *ends)
     beyond = abs(along) - length / 2
     return (g**2 + ((abs(beyond) + beyond) / 2) ** 2) ** 0.5
 
@@ -136,8 +133,8 @@ def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     [0.5, 0.5]
     """
     xy = check_array("points", points, (..., 2))
-    (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
-    return np.asarray(segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
+    ends = check_wall([np.asarray(a), np.asarray(b)])
+    return np.asarray(segment_formula(xy[..., 0], xy[..., 1], *ends.ravel()))
 
 
 def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
@@ -171,7 +168,7 @@ def check_wall(wall: ArrayLike) -> Array:
     ends = check_array("a wall", wall, (2, 2))
     is_long = np.hypot(*(ends[1] - ends[0])) >= SHORTEST_WALL
     expected = f"two different end points, at least {SHORTEST_WALL} m apart"
-    require(is_long, "a wall", ends.tolist(), expected, SolverError)
+    check_argument(is_long, "a wall", ends.tolist(), expected)
     return ends
 
 
@@ -280,7 +277,7 @@ class Obstacle:
         numbers : of the obstacles, shape (n, m).
         offsets : distances, shape (n,) [m].
         """
-        everywhere = np.full((len(numbers), 2), np.inf)
+        everywhere = np.full((len(numbers), 2), inf)
         return -everywhere, everywhere
 
     def margin(self, settings: MPCSettings) -> float:
@@ -345,10 +342,9 @@ class Zone(Obstacle):
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """See `Obstacle.distance`: approximate, from the sum of focal distances."""
-        xa, ya, xb, yb, a, _, _, vx, vy, *knots = numbers
+        vx, vy, *knots = numbers[7:]
         dx, dy, growth = _drift(t, knots)
-        focal = ellipse_formula(x - dx - t * vx, y - dy - t * vy, xa, ya, xb, yb, a)
-        return focal - growth
+        return ellipse_formula(x - dx - t * vx, y - dy - t * vy, *numbers[:5]) - growth
 
     @staticmethod
     def gap(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
@@ -416,8 +412,7 @@ class Wall(Obstacle):
     @staticmethod
     def _travel(distance: Any, *numbers: Any) -> Any:
         """The s of d = s + s^2/L: it changes by no more than the robot moves (`differential_drive`)."""
-        xa, ya, xb, yb = numbers
-        length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+        length, _, _ = _project(0.0, 0.0, *numbers)
         return length / 2 * ((1 + 4 * distance / length) ** 0.5 - 1)
 
     @classmethod
@@ -461,8 +456,7 @@ class HalfPlane(Obstacle):
         x, y = check_array("point", point, (2,)).tolist()
         nx, ny = check_array("normal", normal, (2,)).tolist()
         length = hypot(nx, ny)
-        if length == 0:
-            raise SolverError(f"normal must have a direction; got {normal!r}")
+        check_argument(length > 0, "normal", normal, "a direction")
         super().__init__(x, y, nx / length, ny / length)
 
     @staticmethod
@@ -488,11 +482,6 @@ class Path(NamedTuple):
     points: Array
     times: Array
     bows: Array
-
-    def joined(self, later: Path) -> Path:
-        """This path, and then a `later` one, which begins where and when this one ends."""
-        rest = later.points[1:], later.times[1:], later.bows
-        return Path._make(map(np.concatenate, zip(self, rest, strict=True)))
 
 
 class Bound(NamedTuple):
@@ -641,9 +630,10 @@ class Obstacles(NamedTuple):
         robot leaves a uniform motion by at most the bow.
         """
         length = np.hypot(*np.diff(path.points, axis=0).T).sum() + path.bows.sum()
-        reach = length + self.speeds * (path.times[-1] - path.times[0])
-        at_first = path.points[0, 0], path.points[0, 1], path.times[0]
-        first = self.h(*at_first) if is_barrier else self.gaps(*at_first)
+        reach = length + self.speeds * np.ptp(path.times)
+        measure = Obstacles.h if is_barrier else Obstacles.gaps
+        x, y = path.points[0]
+        first = measure(self, x, y, path.times[0])
         near = self.select_near(first - reach)
         if not near.groups:
             return Bound()
@@ -653,7 +643,7 @@ class Obstacles(NamedTuple):
             np.interp(parts, np.arange(n + 1), each)
             for each in (*path.points.T, path.times)
         )
-        gaps = (near.h if is_barrier else near.gaps)(x, y, t)
+        gaps = measure(near, x, y, t)
         moved = near.speeds[:, None] * np.diff(t)
         reach = np.hypot(np.diff(x), np.diff(y)) + moved
         bows = np.repeat(path.bows, _PARTS)
@@ -696,15 +686,12 @@ class Obstacles(NamedTuple):
     ) -> Array:
         """The `formula` of each obstacle, shape (n, ...); of a barrier less its offset."""
         shape = np.shape(x + y + t)
-        found = np.empty((self.size, *shape))
         axes = (...,) + (None,) * len(shape)
-        begin = 0
+        found = [np.empty((0, *shape))]
         for kind, numbers, offsets in self.groups:
             values = getattr(kind, formula)(x, y, t, *numbers.T[axes])
-            end = begin + len(offsets)
-            found[begin:end] = values - offsets[axes] if is_barrier else values
-            begin = end
-        return found
+            found.append(values - offsets[axes] if is_barrier else values)
+        return np.concatenate(found)
 
 
 def find_bodies(
@@ -759,5 +746,5 @@ def restore(content: dict[str, Any]) -> Obstacle:
     expected = (
         "that of a class of obstacles, which must be defined before the file is read"
     )
-    require(kind, "the kind of an obstacle", content["kind"], expected, SolverError)
+    check_argument(kind, "the kind of an obstacle", content["kind"], expected)
     return rebuild(kind, content["numbers"])

@@ -34,11 +34,10 @@ from ..core.checks import (
     check_array,
     check_number,
     check_point,
-    require,
 )
 from ..core.errors import SolverError, ZoneError
 from ..zones.ellipses import Ellipse
-from .settings import MPCSettings
+from .settings import MPCSettings, check_argument
 
 # Below this speed a person counts as standing, to allow for a tracker's noise [m/s] (assumed).
 STANDING_SPEED = 0.1
@@ -121,7 +120,7 @@ class Prediction:
             f"({n},) or ({n}, 2, 2)"
         )
         given = self.times, self.spread
-        require(is_later and is_spread, "a prediction", given, expected, SolverError)
+        check_argument(is_later and is_spread, "a prediction", given, expected)
         spread = np.broadcast_to(spread, n)
         vars(self).update(times=times, positions=positions, spread=spread)
 
@@ -145,7 +144,7 @@ class Prediction:
 
 def list_knots(person: Person, settings: MPCSettings) -> Array:
     """What `Zone` and `Body` of a `person` need for each interval of the horizon of these `settings`."""
-    times = np.array(settings.times)
+    times = settings.times
     offsets = np.zeros((settings.N + 1, 3))
     if person.prediction is not None:
         offsets = person.prediction.sample(person, times)
@@ -186,7 +185,7 @@ def predict(
     positions = check_array("positions", positions, (n, np.size(times), 2))
     spreads = spreads if spreads.ndim else np.full(n, spreads)
     expected = f"a number, or one for each of {n} people"
-    require(len(spreads) == n, "spread", spreads.shape, expected, SolverError)
+    check_argument(len(spreads) == n, "spread", spreads.shape, expected)
     return [
         Person((x, y), (vx, vy), prediction=Prediction(times, xy, own))
         for (x, y, vx, vy), xy, own in zip(rows, positions, spreads, strict=True)
@@ -249,8 +248,7 @@ class Person:
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
         is_one = isinstance(self.prediction, Prediction | None)
-        name = "prediction"
-        require(is_one, name, self.prediction, "a Prediction", SolverError)
+        check_argument(is_one, "prediction", self.prediction, "a Prediction")
 
     @property
     def stands(self) -> bool:
@@ -261,18 +259,13 @@ class Person:
         """The same person, `seconds` later, as predicted, but no farther from the origin than `LARGEST`."""
         if not seconds or (self.stands and self.prediction is None):
             return self
-        x, y = self.position
-        vx, vy = self.velocity
-        later = self.prediction
-        x = x + vx * seconds
-        y = y + vy * seconds
-        if later is not None:
-            dx, dy, _ = later.sample(self, np.array([seconds]))[0].tolist()
-            x = x + dx
-            y = y + dy
-            later = later.later(seconds)
-        person = self.at([max(-LARGEST, min(each, LARGEST)) for each in (x, y)])
-        vars(person).update(prediction=later)
+        position = self.position + seconds * np.array(self.velocity)
+        prediction = self.prediction
+        if prediction is not None:
+            position += prediction.sample(self, np.array([seconds]))[0, :2]
+            prediction = prediction.later(seconds)
+        person = self.at(position.clip(-LARGEST, LARGEST))
+        vars(person).update(prediction=prediction)
         return person
 
     def at(self, position: ArrayLike) -> Person:

@@ -71,8 +71,13 @@ _SOLVED = 1
 _VIOLATED = 2
 # No regularisation of convex programs; beside the exact penalty, a negligible quadratic one.
 # A program of ordinary crowds takes at most some 120 iterations, one that many people overlap 10,000.
-_DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3, "eq_reduction": -1}
-_DAQP["iter_limit"] = 1000
+_DAQP = {
+    "primal_tol": 1e-9,
+    "eps_prox": 0.0,
+    "rho_soft": 1e3,
+    "eq_reduction": -1,
+    "iter_limit": 1000,
+}
 
 
 class Plan(NamedTuple):
@@ -123,8 +128,7 @@ class TimeBudget:
     def extend(self) -> None:
         """Measure the computing time anew: a problem of a new size was built, which is done once."""
         self._wall = perf_counter()
-        # a system call
-        self._thread = thread_time() if self._limit < inf else 0.0
+        self._thread = thread_time()
 
     @property
     def is_spent(self) -> bool:
@@ -155,14 +159,14 @@ class Program(LinearProblem):
         super().__init__(settings, shapes, has_floors)
         s = settings
         k = self.steps
-        times = np.array(settings.times)
+        times = s.times
         # inputs change by 2 a_max at most on each axis
         change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
         self.near = np.full_like(self.lower, -inf)
         self.prices = np.zeros_like(self.lower)
         self.near[self.first :] = -np.minimum(change, NEAR)[k]
         zone_price = s.zone_price if s.zone_price < inf else 0.0
-        of_level = np.array([0.0, 0.0, zone_price, min(s.decay_price, HARD_PRICE)])
+        of_level = np.array([0.0, 0.0, zone_price, s.decay_price])
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
         self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
         self._is_hard = s.decay_price >= HARD_PRICE
@@ -253,10 +257,6 @@ class Program(LinearProblem):
         sums = np.bincount(self.levels, violated, len(Priority))[: Priority.DECAY]
         return tuple(sums.round(4).tolist())
 
-    def sum_cost(self) -> float:
-        """The cost of the plan, with the prices of what it violates."""
-        return float(self.cost[0] + np.maximum(self.lower, 0.0) @ self.prices)
-
 
 def _find_reach_time(s: MPCSettings) -> float:
     """Time to h = 0 at constant speed from which on no step of a plan can violate a row [s].
@@ -338,7 +338,7 @@ class Planner:
         x, y = states[:, :2].T
         speed = np.hypot(*states[:, 2:].T).max()
         reach = (speed + barriers.speeds) * _find_reach_time(s)
-        travel = barriers.find_travel(x, y, np.array(s.times), s.body_gap)
+        travel = barriers.find_travel(x, y, s.times, s.body_gap)
         return np.asarray(travel.min(axis=1) - reach)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:
@@ -397,7 +397,7 @@ class Planner:
             if is_converged or timed_out:
                 break
         self._on_speed[:] = program.multipliers
-        inputs = np.minimum(np.maximum(program.inputs, -s.a_max), s.a_max)
+        inputs = program.inputs.clip(-s.a_max, s.a_max)
         if not is_converged:
             states = build_horizon(s).states(np.array(question.state), inputs)
             inputs = follow_velocities(s, question.state[2:], states[1:, 2:])
@@ -406,6 +406,8 @@ class Planner:
             program.evaluate()
             is_relaxed = is_relaxed or program.is_violated()
         violations = program.sum_violations() if is_relaxed else ()
-        is_compared = is_relaxed or s.lookahead < inf
-        cost = program.sum_cost() if is_compared else 0.0
+        cost = 0.0
+        if is_relaxed or s.lookahead < inf:  # it may be compared
+            of_rows = program.lower.clip(0.0) @ program.prices
+            cost = float(program.cost[0] + of_rows)
         return Plan(inputs, cost, violations, is_relaxed, timed_out)

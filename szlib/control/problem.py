@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, lru_cache
-from math import hypot, inf
+from functools import lru_cache
+from math import inf
 from threading import Lock
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..core.checks import Array
-from .obstacles import Group, Obstacle, Obstacles, Point, Priority
+from .obstacles import Group, Obstacle, Obstacles, Priority
 from .settings import TOLERANCE, MPCSettings
 
 
@@ -36,26 +36,17 @@ class Question(NamedTuple):
     barriers: Obstacles
 
 
-class Motion(NamedTuple):
-    """The motion and the cost of a plan, in symbols.
+@lru_cache
+def build_motion(settings: MPCSettings) -> tuple[Any, ...]:
+    """The motion of a double integrator, and the cost of a plan, for these `settings`, in symbols.
 
-    Attributes
-    ----------
+    Returns
+    -------
     inputs : u_0 .. u_{N-1}, shape (2, N).
     given : the state, the target, and the last input, 8 numbers.
     states : x_0 .. x_N, shape (4, N+1).
     cost : of the plan.
     """
-
-    inputs: Any
-    given: Any
-    states: Any
-    cost: Any
-
-
-@lru_cache(maxsize=64)
-def build_motion(settings: MPCSettings) -> Motion:
-    """The motion of a double integrator, and the cost, for these `settings`."""
     s = settings
     inputs = ca.SX.sym("u", 2, settings.N)
     given = ca.SX.sym("given", 8)
@@ -72,11 +63,10 @@ def build_motion(settings: MPCSettings) -> Motion:
     weights = ca.DM(np.column_stack([np.zeros(4), np.outer(s.Q, lengths[:-1]), s.P]))
     error = x - ca.repmat(ca.vertcat(given[4:6], 0, 0), 1, s.N + 1)
     cost = ca.dot(weights, error**2) + ca.dot(ca.DM(np.outer(s.R, lengths)), inputs**2)
-    if s.jerk_weight:
-        change = inputs - ca.horzcat(given[6:], inputs[:, :-1])
-        by_jerk = np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)
-        cost += ca.dot(ca.DM(by_jerk), change**2)
-    return Motion(inputs, given, x, cost)
+    change = inputs - ca.horzcat(given[6:], inputs[:, :-1])
+    by_jerk = np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)
+    cost += ca.dot(ca.DM(by_jerk), change**2)
+    return inputs, given, x, cost
 
 
 class Horizon(NamedTuple):
@@ -102,10 +92,10 @@ class Horizon(NamedTuple):
         return states
 
 
-@lru_cache(maxsize=64)
+@lru_cache
 def build_horizon(settings: MPCSettings) -> Horizon:
     """The matrices of the motion for these `settings`."""
-    times = np.array(settings.times)
+    times = settings.times
     past = np.tri(settings.N)
     dt = np.diff(times)
     ends = times[1:]
@@ -126,20 +116,20 @@ def follow_velocities(
     velocity : of the robot now [m/s].
     targets : velocities at the end of each step, shape (N, 2) [m/s].
     """
-    v = velocity
-    slowest = hypot(*velocity)
-    plan = list[Point]()
-    ends = zip(targets.tolist(), s.step_lengths, s.times[1:], strict=True)
-    for (wx, wy), length, time in ends:
+    # complex numbers: velocities vx + i vy
+    v = complex(*velocity)
+    slowest = abs(v)
+    plan = list[complex]()
+    wanted = (targets @ (1, 1j)).tolist()
+    times = s.times[1:].tolist()
+    for w, length, time in zip(wanted, s.step_lengths, times, strict=True):
         dt = s.dt * length
         limit = max(s.v_max, slowest - s.a_max * time)
-        share = min(1.0, limit / (hypot(wx, wy) or 1.0))
-        dx = share * wx - v[0]
-        dy = share * wy - v[1]
-        seconds = max(dt, abs(dx) / s.a_max, abs(dy) / s.a_max)
-        plan.append((dx / seconds, dy / seconds))
-        v = v[0] + dt * dx / seconds, v[1] + dt * dy / seconds
-    return np.array(plan).clip(-s.a_max, s.a_max)
+        change = min(1.0, limit / (abs(w) or 1.0)) * w - v
+        seconds = max(dt, abs(change.real) / s.a_max, abs(change.imag) / s.a_max)
+        plan.append(change / seconds)
+        v += dt * change / seconds
+    return np.array(plan).view(float).reshape(-1, 2).clip(-s.a_max, s.a_max)
 
 
 def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
@@ -160,7 +150,7 @@ class Condition(NamedTuple):
     keep: tuple[float, ...]
 
 
-@cache
+@lru_cache
 def list_conditions(
     settings: MPCSettings, kind: type[Obstacle], has_floors: bool
 ) -> tuple[Condition, ...]:
@@ -169,21 +159,19 @@ def list_conditions(
     With the floors of `szlib.control.planner` if it `has_floors`.
     """
     s = settings
-    lengths = settings.step_lengths
-    found = list[Condition]()
-    stop = min(1.0, s.a_max * s.dt / s.v_max)
+    lengths = s.step_lengths
     if not kind.has_barrier:
         return (Condition(kind.priority, (0.0,) * s.N),)
-    is_wall = has_floors and kind.priority == Priority.WALL
-    if not (is_wall and stop <= s.gamma + TOLERANCE and s.N_h == s.N):
-        decay = tuple((1 - s.gamma) ** m for m in lengths[: s.N_h])
-        found.append(Condition(Priority.DECAY, decay))
-    if is_wall:
-        stops = tuple((1 - stop) ** m for m in lengths)
-        found.append(Condition(Priority.WALL, stops))
-    elif has_floors:
-        found.append(Condition(kind.priority, (0.0,) * s.N_h))
-    return tuple(found)
+    falls = tuple((1 - s.gamma) ** m for m in lengths[: s.N_h])
+    decay = Condition(Priority.DECAY, falls)
+    if not has_floors:
+        return (decay,)
+    if kind.priority > Priority.WALL:
+        return decay, Condition(kind.priority, (0.0,) * s.N_h)
+    stop = min(1.0, s.a_max * s.dt / s.v_max)
+    floor = Condition(Priority.WALL, tuple((1 - stop) ** m for m in lengths))
+    is_implied = stop <= s.gamma + TOLERANCE and s.N_h == s.N
+    return (floor,) if is_implied else (decay, floor)
 
 
 def _write_conditions(
@@ -200,7 +188,7 @@ def _write_conditions(
     *own, offset = ca.vertsplit(numbers)
     h = [
         kind.distance(at[0, k], at[1, k], time, *own) - offset
-        for k, time in enumerate(s.times)
+        for k, time in enumerate(s.times.tolist())
     ]
     conditions = list_conditions(s, kind, has_floors)
     found = [
@@ -234,7 +222,7 @@ def _linearise_kind(
 _MOST_CURVED = 1e3
 
 
-@lru_cache(maxsize=64)
+@lru_cache
 def _linearise_motion(settings: MPCSettings) -> Any:
     """The part of a quadratic program without obstacles: see `LinearProblem`."""
     s = settings
@@ -284,8 +272,8 @@ class LinearProblem:
 
     Attributes
     ----------
-    inputs, given, multipliers : of the plan, shape (N, 2); see `Motion`; of the speed limits, negative where
-        one holds. To be filled.
+    inputs, given, multipliers : of the plan, shape (N, 2); see `build_motion`; of the speed limits, negative
+        where one holds. To be filled.
     lower, upper, slopes : of the rows.
     hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
     first : number of rows before those of obstacles.
@@ -320,8 +308,15 @@ class LinearProblem:
         arguments = [self.inputs, self.given, self.multipliers]
         positions = np.zeros((s.N + 1, 2))
         begin = self.first
-        results = [positions, self.lower, self.upper, self.slopes[n:], self.hessian]
-        results += [self.gradient, self.cost]
+        results = [
+            positions,
+            self.lower,
+            self.upper,
+            self.slopes[n:],
+            self.hessian,
+            self.gradient,
+            self.cost,
+        ]
         self._calls = [_call(motion, arguments, results)]
         self._numbers = list[Array]()
         for kind, number, count in shapes:
@@ -357,7 +352,7 @@ def _call(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -
 
 
 # Measured on the approach to a person: 7 iterations instead of 9.4, in 0.65 of the time.
-_IPOPT = {
+_IPOPT: dict[str, Any] = {
     "print_level": 0,
     "sb": "yes",
     # The start is close to the solution: the plan of the step before, by its trend.
@@ -411,7 +406,7 @@ def solve_by_ipopt(
     return inputs.reshape(-1, 2) if is_solved else None
 
 
-@lru_cache(maxsize=256)
+@lru_cache
 def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
     """The problem in symbols, and its solver."""
     s = settings
@@ -425,14 +420,17 @@ def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
     rows.append(s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T)
     if s.terminal == "rest":
         rows.append(x[2:, s.N])
-    # a failure shows in `Step.status`
-    options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
-    options["show_eval_warnings"] = False
-    options |= {f"ipopt.{name}": value for name, value in _IPOPT.items()}
-    options["ipopt.max_iter"] = s.max_iterations
+    of_ipopt = _IPOPT | {"max_iter": s.max_iterations}
     for name, limit in (("cpu", s.time_limit), ("wall", s.deadline)):
         if limit < inf:
-            options[f"ipopt.max_{name}_time"] = limit / 2
+            of_ipopt[f"max_{name}_time"] = limit / 2
+    options: dict[str, Any] = {
+        "expand": True,
+        "print_time": False,
+        "calc_lam_p": False,
+        "show_eval_warnings": False,  # a failure shows in `Step.status`
+        "ipopt": of_ipopt,
+    }
     parameters = ca.vertcat(given, *numbers)
     problem = {"x": ca.vec(inputs), "p": parameters, "f": cost, "g": ca.vertcat(*rows)}
     return ca.nlpsol("hard", "ipopt", problem, options)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from itertools import accumulate
 from math import expm1, inf, log1p
 from typing import Any, Literal, get_args
 
@@ -14,6 +12,8 @@ import numpy as np
 from ..core.checks import Array, check_array, check_number, require
 from ..core.errors import SolverError
 
+# Raises SolverError: "`name` must be `expected`; got `value`".
+check_argument = partial(require, error=SolverError)
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
@@ -29,12 +29,13 @@ _CHOICES = {
 _COUNTS = "N", "N_h", "max_iterations"
 # settings that may be infinite
 _LIMITS = "lookahead decay_price zone_price time_limit deadline"
-# Ranges of numbers: as a check, in words, and the names of the settings that must lie in it.
-_RANGES: tuple[tuple[Callable[[Array], Any], str, str], ...] = (
-    (lambda v: v > 0, "positive", f"dt R a_max v_max zone_speed {_LIMITS}"),
-    (lambda v: v >= 0, "at least 0", "Q P jerk_weight r_robot eps body_gap"),
-    (lambda v: (v > 0) & (v <= 1), "in (0, 1]", "gamma"),
-    (lambda v: (v >= 0) & (v <= 0.5), "in [0, 0.5]", "head_on_share"),
+_POSITIVE = 5e-324  # the smallest positive float
+# Ranges of numbers: both ends, in words, and the names of the settings that must lie in it.
+_RANGES = (
+    (_POSITIVE, inf, "positive", f"dt R a_max v_max zone_speed {_LIMITS}"),
+    (0.0, inf, "at least 0", "Q P jerk_weight r_robot eps body_gap"),
+    (_POSITIVE, 1.0, "in (0, 1]", "gamma"),
+    (0.0, 0.5, "in [0, 0.5]", "head_on_share"),
 )
 # What the paper has instead of the default, and the settings whose default is not the paper's, by source.
 _PAPER: dict[str, Any] = {
@@ -147,25 +148,26 @@ class MPCSettings:
 
     def __post_init__(self) -> None:
         put = partial(object.__setattr__, self)
-        for holds, expected, names in _RANGES:
+        for least, most, expected, names in _RANGES:
             for name in names.split():
                 value = getattr(self, name)
                 shape = np.shape(getattr(MPCSettings, name))
                 if name in _LIMITS.split() and value == inf:
                     continue
                 numbers = check_array(name, value, shape)
-                require(holds(numbers).all(), name, value, expected, SolverError)
+                is_within = ((least <= numbers) & (numbers <= most)).all()
+                check_argument(is_within, name, value, expected)
                 put(name, tuple(numbers.tolist()) if shape else float(numbers))
         for name in _COUNTS:
             value = getattr(self, name)
             is_count = isinstance(value, int | np.integer) and value >= 1
-            require(is_count, name, value, "a whole number >= 1", SolverError)
+            check_argument(is_count, name, value, "a whole number >= 1")
         for name, choice in _CHOICES.items():
             value = getattr(self, name)
             allowed = get_args(choice)
             expected = " or ".join(map(repr, allowed))
             is_allowed = isinstance(value, str | bool | np.bool_) and value in allowed
-            require(is_allowed, name, value, expected, SolverError)
+            check_argument(is_allowed, name, value, expected)
         lengths = check_array("grid", self.grid, (np.size(self.grid),))
         grid = tuple(lengths.astype(int).tolist())
         put("grid", grid)
@@ -174,13 +176,11 @@ class MPCSettings:
             is_grid = grid[0] == 1 == min(grid) and self.terminal == "none"
             is_grid &= grid == tuple(lengths.tolist())
             expected = "whole numbers >= 1, the first 1, and no terminal condition"
-            require(is_grid, "grid", grid, expected, SolverError)
+            check_argument(is_grid, "grid", grid, expected)
             put("N", len(grid))
         if grid or self.terminal != "none":
             put("N_h", self.N)
-        require(
-            self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}", SolverError
-        )
+        check_argument(self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}")
 
     @classmethod
     def paper(cls, **changes: Any) -> MPCSettings:
@@ -228,26 +228,21 @@ class MPCSettings:
         --------
         >>> import szlib
         >>> settings = szlib.MPCSettings.among_people(v_max=1.3)
-        >>> settings.N, round(settings.times[-1], 6)
+        >>> settings.N, float(settings.times[-1].round(6))
         (14, 3.0)
         """
-        grid = (1,) * 4 + (2,) * 4 + (3,) * 6
-        dt, v_max = (
-            check_number(name, changes.get(name, getattr(cls, name)))
-            for name in ("dt", "v_max")
-        )
-        reach = sum(grid) * dt * v_max
         own: dict[str, Any] = {
             "gamma": 0.1,
-            "grid": grid,
+            "grid": (1,) * 4 + (2,) * 4 + (3,) * 6,
             "jerk_weight": 6.0,
-            "lookahead": reach + 1.0,
             "decay_price": 10.0,
             "zone_price": 200.0,
             "body_gap": 0.2,
             "max_iterations": 8,
         }
-        return cls(**own | changes)
+        chosen = cls(**own | changes)
+        reach = chosen.times[-1] * chosen.v_max
+        return replace(chosen, lookahead=changes.get("lookahead", reach + 1.0))
 
     @cached_property
     def step_lengths(self) -> tuple[int, ...]:
@@ -255,9 +250,9 @@ class MPCSettings:
         return self.grid or (1,) * self.N
 
     @cached_property
-    def times(self) -> tuple[float, ...]:
-        """Time of each state of the plan, from now, N+1 numbers [s]."""
-        return tuple(self.dt * k for k in accumulate(self.step_lengths, initial=0))
+    def times(self) -> Array:
+        """Time of each state of the plan, from now, shape (N+1,) [s]."""
+        return np.asarray(self.dt * np.cumsum((0, *self.step_lengths)))
 
     def badges(self) -> dict[str, str]:
         """The source of each value, by name.
@@ -270,9 +265,9 @@ class MPCSettings:
         value = getattr(self, name)
         if value == _PAPER.get(name):
             return "paper"
-        if value == getattr(MPCSettings, name):
-            of_name = (
-                each for each, names in _SOURCES.items() if name in names.split()
-            )
-            return next(of_name, "paper")
-        return "chosen"
+        if value != getattr(MPCSettings, name):
+            return "chosen"
+        for source, names in _SOURCES.items():
+            if name in names.split():
+                return source
+        return "paper"

@@ -74,14 +74,10 @@ class Scene(NamedTuple):
         return h
 
     @property
-    def h_of_goal(self) -> Array:
-        """Barriers at the goal, shape (obstacles,) [m]; inf for people who walk."""
-        return self.find_standing_h(*self.goal)
-
-    @property
     def goal_blocked(self) -> bool:
         """True if h < 0 at the goal, because of something fixed or of a person who stands; or in a solid."""
-        return self.is_solid(*self.goal) or bool((self.h_of_goal < 0).any())
+        h = self.find_standing_h(*self.goal)
+        return self.is_solid(*self.goal) or bool((h < 0).any())
 
     def is_solid(self, x: float, y: float) -> bool:
         """True if walls enclose the place (`x`, `y`) [m]."""
@@ -96,29 +92,6 @@ class Scene(NamedTuple):
         *before, own = self.fixed.items[: i - n + 1]
         same = sum(each.kind == own.kind for each in before)
         return f"{own.kind} {same}{repr(own).removeprefix(own.kind)}"
-
-    def find_danger(self, path: Path, is_feasible: bool) -> str:
-        """Why a robot is not safe that goes along a `path` for a step; "" if it is.
-
-        `is_feasible` says whether its plan violates no row without a price.
-        h has the allowance eps on the way: it is for what a way cuts off a round zone.
-        """
-        if self.tracked.unknown:
-            return "the position of a person is unknown, so the robot comes to rest"
-        barriers = self.barriers
-        if self.is_solid(*path.points[0]):
-            return "the robot is inside of a solid wall"
-        x, y = path.points.T
-        now, then = barriers.h(x, y, path.times).T
-        if (now < -TOLERANCE).any():
-            return f"the robot is already too close to {self.name(int(now.argmin()))}"
-        if not is_feasible:
-            return "its plan is not feasible"
-        if (then < -TOLERANCE).any():
-            return f"it comes too close to {self.name(int(then.argmin()))}"
-        h = self.zones.bound(path, is_barrier=True).lower + self.settings.eps
-        is_safe = min(barriers.bound(path).lower, h) >= -TOLERANCE
-        return "" if is_safe else "its disc overlaps a body or a wall"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,7 +189,7 @@ class Step:
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """What `h` belongs to: the `Zone` of each person, then everything fixed."""
-        return self.scene.zones.items + self.scene.fixed.items
+        return self.scene.barriers.items
 
     @cached_property
     def h(self) -> Array:
@@ -238,7 +211,7 @@ class Step:
         scene = self.asked
         x = self.planned
         s = scene.settings
-        at = (*x.T[:2], np.array(s.times))
+        at = (*x.T[:2], s.times)
         bodies = find_bodies(scene.zones, s, as_predicted=True)
         return list(list_rows(scene, x, scene.barriers.h(*at), bodies.h(*at)))
 
@@ -292,8 +265,7 @@ class Step:
         Negative is an overlap.
         """
         x, y, *_ = self.predicted.T
-        times = np.array(self.scene.settings.times)
-        return self.scene.barriers.gaps(x, y, times)
+        return self.scene.barriers.gaps(x, y, self.scene.settings.times)
 
     @property
     def safe(self) -> bool:
@@ -308,7 +280,28 @@ class Step:
         return not self._find_danger()
 
     def _find_danger(self) -> str:
-        return self.scene.find_danger(self.path, self.feasible)
+        """Why this step is not `safe`; "" if it is.
+
+        h has the allowance eps on the way: it is for what a way cuts off a round zone.
+        """
+        scene = self.scene
+        path = self.path
+        barriers = scene.barriers
+        if scene.tracked.unknown:
+            return "the position of a person is unknown, so the robot comes to rest"
+        if scene.is_solid(*path.points[0]):
+            return "the robot is inside of a solid wall"
+        x, y = path.points.T
+        now, then = barriers.h(x, y, path.times).T
+        if (now < -TOLERANCE).any():
+            return f"the robot is already too close to {scene.name(int(now.argmin()))}"
+        if not self.feasible:
+            return "its plan is not feasible"
+        if (then < -TOLERANCE).any():
+            return f"it comes too close to {scene.name(int(then.argmin()))}"
+        h = scene.zones.bound(path, is_barrier=True).lower + scene.settings.eps
+        is_safe = min(barriers.bound(path).lower, h) >= -TOLERANCE
+        return "" if is_safe else "its disc overlaps a body or a wall"
 
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, from that of the point which is planned for; here it is the same."""
@@ -352,17 +345,17 @@ class Step:
     def _list_notes(self) -> list[str]:
         """What else has to be known, and what would help."""
         scene = self.scene
-        s = self.scene.settings
+        s = scene.settings
         worst = self.violations
         falls = self.residual.min(axis=1)
         slowest = scene.name(int(falls.argmin())) if len(falls) else ""
-        is_cut = s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE
         notes = {
             f"h of {slowest} falls faster than gamma = {s.gamma:g}, at its price; what helps: a "
             f"decay_price above {s.decay_price:g}": s.decay_price < inf
             and worst[Priority.DECAY] > TOLERANCE,
             f"it enters a zone by {worst[Priority.ZONE]:.2g} m, at its price; what helps: a zone_price above "
-            f"{s.zone_price:g}": is_cut,
+            f"{s.zone_price:g}": s.zone_price < inf
+            and worst[Priority.ZONE] > TOLERANCE,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
             "v_max": not self.passively_safe,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,9 +63,9 @@ class Rows(NamedTuple):
 
     def is_hard(self, s: MPCSettings) -> bool:
         """True if no price can buy a violation, by the settings `s`."""
-        if self.level is None or s.decay_price == np.inf:
+        if self.level is None or s.decay_price == inf:
             return self.level in (None, Priority.DECAY)
-        return self.level < Priority.ZONE + (s.zone_price == np.inf)
+        return self.level < Priority.ZONE + (s.zone_price == inf)
 
 
 def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
@@ -73,20 +74,17 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
     `h` are the barriers there, and `gaps` those to bodies less `body_gap`, shape (n, N+1) each [m].
     """
     s = scene.settings
-    lengths = np.array(scene.settings.step_lengths)
+    lengths = np.array(s.step_lengths)
     first = 0
     stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
     for kind, _, offsets in scene.barriers.groups:
         own = h[first : first + len(offsets)]
         falls = own[:, 1:] - (1 - s.gamma) ** lengths * own[:, :-1]
+        floors = own[:, 1 : s.N_h + 1]
         if kind.priority == Priority.WALL:
             floors = own[:, 1:] - stop**lengths * own[:, :-1]
-            yield Rows(Priority.WALL, kind.kind, first, floors)
-        else:
-            last = s.N_h if kind.has_barrier else s.N
-            yield Rows(kind.priority, kind.kind, first, own[:, 1 : last + 1])
-        if kind.has_barrier:
-            yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
+        yield Rows(kind.priority, kind.kind, first, floors)
+        yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
         first += len(offsets)
     if len(gaps):
         yield Rows(Priority.BODY, "body", 0, gaps[:, 1:])
@@ -96,7 +94,7 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
     if s.terminal == "rest":
         speed = np.abs(velocity).max(axis=1)
         is_end = np.arange(s.N) == s.N - 1
-        yield Rows(None, "end", 0, np.where(is_end, -speed, np.inf)[None])
+        yield Rows(None, "end", 0, np.where(is_end, -speed, inf)[None])
 
 
 @dataclass(frozen=True)
@@ -134,24 +132,25 @@ class Sampled(NamedTuple):
 def verify_step(step: Any) -> Report:
     """Check the plan of a `step` (a `Step`), and its claims."""
     scene = step.scene
-    s = step.asked.settings
-    x = np.asarray(step.planned, float)
+    asked = step.asked
+    s = asked.settings
+    x = step.planned
     lengths = np.array(s.step_lengths)
-    way = _sample(np.array(step.asked.state), step.inputs, s.dt * lengths)
-    h = _measure(step.asked, x[:, :2], way.times[::PIECES], is_barrier=True)
+    way = _sample(np.array(asked.state), step.inputs, s.dt * lengths)
+    at = x[:, :2], way.times[::PIECES]
+    h = _measure(asked, *at, is_barrier=True)
     residual = h[:, 1:] - (1 - s.gamma) ** lengths * h[:, :-1]
-    gaps = _measure(step.asked, x[:, :2], way.times[::PIECES])
-    rows = list_rows(step.asked, x, h, gaps[: len(scene.people)] - s.body_gap)
-    worst = _find_worst(step.asked, (each for each in rows if each.is_hard(s)))
+    gaps = _measure(asked, *at)
+    rows = list_rows(asked, x, h, gaps[: len(scene.people)] - s.body_gap)
+    worst = _find_worst(asked, (each for each in rows if each.is_hard(s)))
     path = step.carry(way).points
     within = path[:_SAMPLES], way.times[:_SAMPLES]
     of_disc = _measure(scene, *within, is_barrier=True)
-    gap = _measure(scene, *within).min(initial=np.inf)
-    of_zones = of_disc[: len(scene.people)].min(initial=np.inf) + scene.settings.eps
-    solids = scene.solids
-    if solids is not None and solids.distance(shapely.Point(path[0])) == 0:
-        gap = -np.inf
-    least = of_disc[:, [0, -1]].min(initial=np.inf)
+    gap = _measure(scene, *within).min(initial=inf)
+    of_zones = of_disc[: len(scene.people)].min(initial=inf) + scene.settings.eps
+    if shapely.distance(scene.solids, shapely.Point(path[0])) == 0:
+        gap = -inf
+    least = of_disc[:, [0, -1]].min(initial=inf)
     lowest = float(min(least, gap, of_zones))
     slack = max(0.0, -worst.value)
     feasible = slack <= TOLERANCE
@@ -294,7 +293,7 @@ def _find_places(
     steady = person.position + np.outer(times, person.velocity)
     if person.prediction is None or not as_predicted:
         return steady, np.zeros(len(steady))
-    samples = person.prediction.sample(person, np.array(s.times)).T
+    samples = person.prediction.sample(person, s.times).T
     dx, dy, growth = (np.interp(times, s.times, each) for each in samples)
     return steady + np.column_stack([dx, dy]), growth
 

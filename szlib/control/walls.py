@@ -18,10 +18,11 @@ from numpy.typing import ArrayLike
 from PIL import Image
 from shapely.affinity import affine_transform
 
-from ..core.checks import Array, check_array, check_number, check_vector, require
-from ..core.errors import DataError, SolverError
+from ..core.checks import Array, check_array, check_number, check_vector
+from ..core.errors import DataError
 from ..core.input_files import printable, read_small
 from .obstacles import SHORTEST_WALL
+from .settings import check_argument
 
 _PICTURES = "1", "L", "P", "RGB"  # modes of Pillow: of at most 8 bits, not transparent
 
@@ -51,7 +52,7 @@ def read_walls(walls: Any) -> Array:
     lines = shapely.remove_repeated_points(lines, SHORTEST_WALL)
     is_long = shapely.length(lines) >= SHORTEST_WALL
     expected = f"{SHORTEST_WALL} m long or longer"
-    require(is_long.all(), "a wall", lines[~is_long], expected, SolverError)
+    check_argument(is_long.all(), "a wall", lines[~is_long], expected)
     corners, line = shapely.get_coordinates(lines, return_index=True)
     ends = np.stack([corners[:-1], corners[1:]], axis=1)
     return np.asarray(ends[line[:-1] == line[1:]])
@@ -83,7 +84,7 @@ def _find_shapes(walls: Any) -> Iterator[tuple[Any, Any]]:
             "a line of shape (m, 2), with m > 1, or segments of shape (n, 2, 2); make them of rows of four "
             "numbers by np.reshape(walls, (-1, 2, 2))"
         )
-        require(is_line, "a wall", given, expected, SolverError)
+        check_argument(is_line, "a wall", given, expected)
         yield np.ravel(shapely.linestrings(corners)), None
 
 
@@ -135,7 +136,7 @@ def walls_from_map(
     >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), walls=walls)
     """
     within = check_number("simplify", simplify)
-    require(within >= 0, "simplify", within, "at least 0", SolverError)
+    check_argument(within >= 0, "simplify", within, "at least 0")
     what = "the map"
     folder = Path(path).parent
     try:
@@ -148,13 +149,19 @@ def walls_from_map(
         side, free, occupied = (check_number(name, entries[name]) for name in names)
         origin = check_array("origin", entries["origin"], (3,))
         below = f"from 0 to below occupied_thresh = {occupied}, which is at most 1"
-        require(0 <= free < occupied <= 1, "free_thresh", free, below)
-        require(entries["negate"] in (0, 1), "negate", entries["negate"], "0 or 1")
-        require(entries["mode"] == "trinary", "mode", entries["mode"], "'trinary'")
-        require(side > 0, "resolution", side, "positive")
+        check_argument(0 <= free < occupied <= 1, "free_thresh", free, below)
+        check_argument(
+            entries["negate"] in (0, 1), "negate", entries["negate"], "0 or 1"
+        )
+        check_argument(
+            entries["mode"] == "trinary", "mode", entries["mode"], "'trinary'"
+        )
+        check_argument(side > 0, "resolution", side, "positive")
         what = f"image {entries['image']!r}"
         picture = Image.open(io.BytesIO(read_small(folder / entries["image"])))
-        require(picture.mode in _PICTURES, "its mode", picture.mode, f"of {_PICTURES}")
+        check_argument(
+            picture.mode in _PICTURES, "its mode", picture.mode, f"of {_PICTURES}"
+        )
         grey = np.asarray(picture.convert("RGB"), float).mean(axis=2)
         p = (grey if entries["negate"] else 255 - grey) / 255
         is_solid = (p >= free) if unknown else (p > occupied)
@@ -198,15 +205,17 @@ def walls_from_grid(
     within = check_number("simplify", simplify)
     given = (side, within)
     expected = "positive, and at least 0"
-    require(side > 0 <= within, "resolution, simplify", given, expected, SolverError)
+    check_argument(side > 0 <= within, "resolution, simplify", given, expected)
     x, y, yaw = check_vector("origin", origin, 3)
     cells = np.asarray(occupied)
     expected = "truth values of shape (rows, columns), such as grid > 65"
     is_grid = cells.ndim == 2 and cells.dtype == bool
-    require(is_grid, "occupied", occupied, expected, SolverError)
-    edges = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    (row, begin), end = (edges > 0).nonzero(), (edges < 0).nonzero()[1]
-    outlines = shapely.union_all(shapely.box(begin, row, end, row + 1))
+    check_argument(is_grid, "occupied", occupied, expected)
+    # edges come in pairs: where a run of occupied cells begins, and where it ends
+    row, edge = np.diff(cells, prepend=False, append=False).nonzero()
+    low = row[::2]
+    runs = shapely.box(edge[::2], low, edge[1::2], low + 1)
+    outlines = shapely.union_all(runs)
     c = side * cos(yaw)
     s = side * sin(yaw)
     turn = [c, -s, s, c, x, y]

@@ -76,7 +76,9 @@ _GOAL_MOVED = 0.5
 _NEAR_WAY = 3  # cells that are near a way are at most so many steps from it
 _EVERY = 20  # turns are measured around so many cells that are not free, one of
 _MOST_SHARE = 1.2  # least offset of obstacles, in cells: no step leads across a wall
-_NEIGHBOURS = (0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)
+_NEIGHBOURS = np.array(
+    [(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)]
+)
 # price of a step to a neighbour: a robot that waits stands still [s]
 _MOVE_PRICE = 0.015
 _MOVES = _MOVE_PRICE * np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
@@ -110,8 +112,8 @@ class Way(NamedTuple):
 
     def at(self, times: Array) -> Array:
         """Where the robot is at these `times`, shape (n, 2) [m]; at the goal from its arrival on."""
-        x, y = (np.interp(times, self.times, each) for each in self.points.T)
-        return np.column_stack([x, y])
+        along = [np.interp(times, self.times, each) for each in self.points.T]
+        return np.column_stack(along)
 
 
 class Heading(NamedTuple):
@@ -175,7 +177,12 @@ class Map:
         wide = distance_transform_edt(self.free) * self.cell >= _DOOR
         self.is_narrow = self.free & (distance_transform_edt(~wide) * self.cell > _DOOR)
         self._parts, _ = label(self.free, np.ones((3, 3)))
-        self._link()
+        # pairs of free neighbours, in 16 directions
+        numbers = np.flatnonzero(self.free)
+        neighbours = numbers + (_NEIGHBOURS @ (self.shape[1], 1))[:, None]
+        direction, k = self.free.ravel()[neighbours].nonzero()
+        self._pairs = np.stack([numbers[k], neighbours[direction, k]])
+        self._lengths = self.cell * np.hypot(*_NEIGHBOURS[direction].T)
 
     def _cover(self, fixed: Obstacles) -> Mask:
         """Where h < 0. Each obstacle is measured in the cells of its box."""
@@ -191,28 +198,12 @@ class Map:
             indices = np.arange(len(counts))
             for rows in np.array_split(indices, 1 + counts.sum() // _CHUNK):
                 which = np.repeat(rows, counts[rows])
-                ends = counts[rows].cumsum()
-                place = np.arange(len(which)) - np.repeat(
-                    ends - counts[rows], counts[rows]
-                )
+                place = np.concatenate([np.arange(n) for n in counts[rows]])
                 cells = first[which].T + np.divmod(place, sizes[which, 1])
                 x, y = self.centers(cells.T).T
                 unsafe = kind.distance(x, y, 0.0, *numbers[which].T) < offsets[which]
                 covered[*cells[:, unsafe]] = True
         return covered
-
-    def _link(self) -> None:
-        """Find the pairs of free neighbours, in 16 directions, and their distances."""
-        pairs = list[Array]()
-        lengths = list[Array]()
-        numbers = np.flatnonzero(self.free)
-        for i, j in _NEIGHBOURS:
-            to = numbers + i * self.shape[1] + j
-            is_free = self.free.ravel()[to]
-            pairs.append(np.stack([numbers, to])[:, is_free])
-            lengths.append(np.full(is_free.sum(), self.cell * hypot(i, j)))
-        self._pairs = np.hstack(pairs)
-        self._lengths = np.concatenate(lengths)
 
     def centers(self, cells: ArrayLike) -> Array:
         """Centres of `cells`, shape (..., 2) [m]."""
@@ -247,9 +238,8 @@ class Map:
         self.is_reached = bool(self.is_near[*self.find_cell(goal)])
         self.end = self.centers(cell)
         cost = 1 + price.ravel()
-        i, j = self._pairs
-        weights = self._lengths / speed * (cost[i] + cost[j]) / 2
-        graph = csr_array((weights, (i, j)), shape=2 * cost.shape)
+        weights = self._lengths / speed * cost[self._pairs].mean(axis=0)
+        graph = csr_array((weights, self._pairs), shape=2 * cost.shape)
         number = np.ravel_multi_index(cell, self.shape)
         far, self._next = dijkstra(graph, False, number, return_predecessors=True)
         self.seconds_to_goal = far.reshape(self.shape)
@@ -416,9 +406,9 @@ class WayFinder:
 
 def _find_turns(way: Way, around: Array, since: float = 0.0) -> Array:
     """Angles by which a `way`, `since` a time [s] on, turns around places `around` it, shape (n,) [rad]."""
-    offset = way.at(since + _TIMES) - around
-    turns = np.diff(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)
-    return np.asarray(((turns + pi) % (2 * pi) - pi).sum(axis=1))
+    seen = (way.at(since + _TIMES) - around) @ (1, 1j)
+    angles = np.unwrap(np.angle(seen))
+    return np.asarray(angles[:, -1] - angles[:, 0])
 
 
 class Surroundings:
@@ -637,13 +627,10 @@ def _turn_aside(
     # complex numbers: the conjugate of u times v has the angle from u to v
     a = complex(*zone[:2]) - at
     b = complex(*zone[2:4]) - at
-    margin = s.r_robot + s.eps
-    at_goal = ellipse_formula(
-        way.real, way.imag, a.real, a.imag, b.real, b.imag, zone[4]
-    )
-    if not a * b or (at_goal < margin and hypot(*zone[7:9]) < STANDING_SPEED):
+    semi_axis = zone[4] + s.r_robot + s.eps  # of the set h < 0
+    is_goal_within = abs(way - a) + abs(way - b) < 2 * semi_axis
+    if not a * b or (is_goal_within and hypot(*zone[7:9]) < STANDING_SPEED):
         return 1.0
-    semi_axis = zone[4] + margin  # of the set h < 0
     cosine = (abs(a) ** 2 + abs(b) ** 2 - 4 * semi_axis**2) / (2 * abs(a) * abs(b))
     w = acos(max(-1.0, min(1.0, cosine))) / 2
     bearing = phase((a / abs(a) + b / abs(b)).conjugate() * way)
