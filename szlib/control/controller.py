@@ -195,7 +195,7 @@ STUCK_AFTER = 5.0
 """Time without progress from which on a robot counts as stuck [s] (assumed)."""
 PROGRESS = 0.1  # by which the way to the goal must shorten; this near, the robot is there [m] (assumed)
 CLOSING_SPEED = 0.1  # a robot that approaches its goal faster than this makes progress [m/s] (assumed)
-NEW_GOAL = 0.5  # a goal that is farther than this from the last one is another goal [m] (assumed)
+NEW_GOAL = 0.5  # a goal that has moved farther than this is another goal [m] (assumed)
 RATE_STEPS = (
     9  # a loop has another rate than dt if most of so many steps have (assumed)
 )
@@ -305,8 +305,9 @@ class StepClock:
     ) -> Array:
         """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
         spans = list[tuple[Array, float]]()
-        expected = f"0 to {OLDEST_STATE:g} s"
-        check_argument(0 <= age <= OLDEST_STATE, "state_age", age, expected)
+        expected = f"{-self._dt:g} to {OLDEST_STATE:g} s"
+        is_usable = -self._dt <= age <= OLDEST_STATE
+        check_argument(is_usable, "state_age", age, expected)
         for control, held in reversed(self._held):
             if age <= 0:
                 break
@@ -321,7 +322,7 @@ class StepClock:
     ) -> float:
         """How long the robot has made no progress [s]; 0 below `STUCK_AFTER`, and while it approaches.
 
-        Progress is a shorter `remaining` way [m] than any before. A `goal` that jumps is a new one.
+        Progress is a shorter `remaining` way [m] than any before. A `goal` that moves far is a new one.
         """
         approaches = self._remaining - remaining > CLOSING_SPEED * self._elapsed
         # the clock may jump
@@ -329,7 +330,7 @@ class StepClock:
         if dist(goal, self._goal) > NEW_GOAL or remaining < self._nearest - PROGRESS:
             self._nearest = remaining
             self._waited = 0.0
-        self._goal = goal
+            self._goal = goal
         self._remaining = remaining
         if self._waited < STUCK_AFTER or remaining <= PROGRESS or approaches:
             return 0.0

@@ -300,6 +300,7 @@ class DifferentialDrive(MPCCBF):
         check_argument(old.shape in ((3,), (5,)), "state", state, expected)
         if len(old) == 3:
             old = np.append(old, np.nan_to_num(self._command))
+        self._goal = goal
         self._own = own = self._clock.bring_forward(self.robot, old, age, old[3:])
         x, y, theta, v, omega = own.tolist()
         turn = self._find_turn((x, y, theta), goal)
@@ -357,7 +358,7 @@ class DifferentialDrive(MPCCBF):
         self._command = control.copy()
         self._planned_velocity = planned[1, 2:]
         state = self.robot.body(self._own)
-        scene = self._make_scene(state, asked.goal, asked.tracked)
+        scene = self._make_scene(state, self._goal, asked.tracked)
         found |= {"control": control, "scene": scene, "of_point": asked}
         return DriveStep(**found, own=self._own, wheels=self._wheels)
 

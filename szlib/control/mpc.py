@@ -105,7 +105,7 @@ class MPCCBF(Controller):
     zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`, such as
         a `SocialZone`, whose zone at `settings.zone_speed` is used.
     walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. Inside of
-        a polygon no step is safe. The attribute `walls` holds the segments.
+        a polygon no step is safe. The attribute `walls` holds the segments; it may be assigned.
     obstacles : what else stands still: each a `HalfPlane` or an `Obstacle` of your own; an attribute as well.
     settings : every other parameter.
     tracker : remembers people by their ids; default: `Tracker()`.
@@ -151,7 +151,6 @@ class MPCCBF(Controller):
 
     settings: MPCSettings
     zone: Ellipse
-    walls: Array
 
     def __init__(
         self,
@@ -165,27 +164,52 @@ class MPCCBF(Controller):
         self.settings = settings or MPCSettings()
         is_one = isinstance(self.settings, MPCSettings)
         expected = "MPCSettings, such as MPCSettings.among_people()"
-        require(is_one, "settings", settings, expected, SolverError)
+        check_argument(is_one, "settings", settings, expected)
         self._s = self._plan_with(self.settings)
         self.zone = _choose_zone(zone, self._s.zone_speed)
         self.tracker = tracker or Tracker()
         self._thread = dict[str, int]()
-        self.obstacles = tuple(obstacles)
-        for each in self.obstacles:
-            if not isinstance(each, Obstacle):
-                raise SolverError(f"an obstacle must be an Obstacle; got {each!r}")
         self._planner = Planner(self._s)
-        self._take_walls(walls)
+        self._take(walls, obstacles)
         self.reset()
+
+    @property
+    def walls(self) -> Array:
+        """The walls, shape (n, 2, 2) [m]; others may be assigned, as by `set_walls`."""
+        return self._segments
+
+    @walls.setter
+    def walls(self, walls: Any) -> None:
+        self.set_walls(walls)
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What else stands still; others may be assigned."""
+        return self._obstacles
+
+    @obstacles.setter
+    def obstacles(self, obstacles: Iterable[Obstacle]) -> None:
+        self._check_thread()
+        self._take(self._given_walls, obstacles)
 
     def _plan_with(self, s: MPCSettings) -> MPCSettings:
         """Settings of the plan of a robot with the settings `s`."""
         return s
 
-    def _take_walls(self, walls: Any) -> None:
-        self.walls = read_walls(walls)
-        items = [Wall(*ends) for ends in self.walls.reshape(-1, 4).tolist()]
-        items += self.obstacles
+    def _take(self, walls: Any, obstacles: Iterable[Obstacle]) -> None:
+        segments = read_walls(walls)
+        items: list[Obstacle] = [
+            Wall(*ends) for ends in segments.reshape(-1, 4).tolist()
+        ]
+        others = tuple(obstacles)
+        for each in others:
+            check_argument(
+                isinstance(each, Obstacle), "an obstacle", each, "an Obstacle"
+            )
+        items += others
+        self._given_walls = walls
+        self._segments = segments
+        self._obstacles = others
         self._solids = find_solids(walls)
         self._fixed = Obstacles.of(items, self._s)
         self._fixed_of_disc = Obstacles.of(items, self.settings)
@@ -206,7 +230,7 @@ class MPCCBF(Controller):
             thread.
         """
         self._check_thread()
-        self._take_walls(walls)
+        self._take(walls, self._obstacles)
 
     def _check_thread(self) -> None:
         if self._thread.setdefault("first", get_ident()) != get_ident():
@@ -251,7 +275,8 @@ class MPCCBF(Controller):
         now : time, by the same clock [s]; default: `dt` after the last step.
         route : a way to the goal from a global planner, corners, shape (m, 2) [m]; default: a way of its own
             (`Step.ways`) if `settings.lookahead` is finite, else none.
-        state_age : time from the measurement of `state` to `now`, at most 1 s [s].
+        state_age : time from the measurement of `state` to `now`, at most 1 s [s]; down to -dt, by jitter, it
+            counts as 0.
 
         Raises
         ------
@@ -475,8 +500,7 @@ class MPCCBF(Controller):
             check_argument(corners.ndim < 3, "route", corners.shape, expected)
             heading = self._ways.follow(at, goal, corners)
         if not heading and (route is not None or s.lookahead < inf):
-            groups = [person.group for person in scene.people]
-            heading = self._ways.find(at, goal, scene.zones, groups)
+            heading = self._ways.find(at, goal, scene.people, scene.zones)
         heading = heading or Heading(goal, dist(at, goal))
         target = heading.target
         if scene.tracked.unknown:

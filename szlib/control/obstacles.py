@@ -236,6 +236,9 @@ class Obstacle:
     def __init_subclass__(cls) -> None:
         if "kind" not in cls.__dict__:
             cls.kind = cls.__name__.lower()
+        is_level = cls.priority < Priority.DECAY
+        expected = "WALL, BODY or ZONE"
+        check_argument(is_level, f"priority of {cls.kind}", cls.priority, expected)
         _KINDS[cls.kind] = cls
 
     def __init__(self, *numbers: float) -> None:
@@ -706,16 +709,6 @@ def find_bodies(
     gap = settings.r_robot + settings.body_gap
     groups = (Group(Body, each, np.full(len(each), gap)) for each in own)
     return Obstacles(tuple(groups), settings.r_robot)
-
-
-def find_places(zones: Obstacles, times: Array) -> Array:
-    """Where the people who have these `zones` are at these `times` from now, shape (n, k, 2) [m]."""
-    found = [np.zeros((0, len(times), 2))]
-    for _, numbers, _ in zones.groups:
-        px, py, vx, vy, *knots = numbers.T[5:, :, None]
-        dx, dy, _ = _drift(times, knots)
-        found.append(np.stack([px + times * vx + dx, py + times * vy + dy], axis=-1))
-    return np.concatenate(found)
 
 
 def rebuild(kind: type[Obstacle], numbers: Sequence[float]) -> Obstacle:

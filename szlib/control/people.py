@@ -179,6 +179,8 @@ def predict(
     >>> one.after(1.0).position
     (1.0, 0.2)
     """
+    if np.size(people) == 0:
+        return []
     rows = check_array("people", people, (..., 4)).reshape(-1, 4).tolist()
     n = len(rows)
     spreads = check_array("spread", spread, (...,))
@@ -247,6 +249,8 @@ class Person:
         vars(self).update(position=position, velocity=velocity, heading=heading)
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
+        is_name = isinstance(self.group, Hashable)
+        check_argument(is_name, "a group", self.group, "hashable, such as a number")
         is_one = isinstance(self.prediction, Prediction | None)
         check_argument(is_one, "prediction", self.prediction, "a Prediction")
 
@@ -273,6 +277,17 @@ class Person:
         moved = copy(self)
         vars(moved).update(position=check_point("a person's position", position))
         return moved
+
+
+def find_places(people: Sequence[Person], times: Array) -> Array:
+    """Where `people` are at these `times` from now, as predicted, shape (n, k, 2) [m]."""
+    found = [np.zeros((0, len(times), 2))]
+    for each in people:
+        places = each.position + np.outer(times, each.velocity)
+        if each.prediction is not None:
+            places += each.prediction.sample(each, times)[:, :2]
+        found.append(places[None])
+    return np.concatenate(found)
 
 
 SAME_PLACE = 0.5

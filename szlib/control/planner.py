@@ -76,7 +76,7 @@ _DAQP = {
     "eps_prox": 0.0,
     "rho_soft": 1e3,
     "eq_reduction": -1,
-    "iter_limit": 1000,
+    "iter_limit": 5000,
 }
 
 

@@ -240,6 +240,10 @@ class MPCSettings:
             "body_gap": 0.2,
             "max_iterations": 8,
         }
+        counts = {"N", "N_h"} & changes.keys()
+        expected = "left out, because `grid` sets them; give `grid` instead"
+        is_used = not (counts and changes.get("grid", True))
+        check_argument(is_used, "N and N_h", changes, expected)
         chosen = cls(**own | changes)
         reach = chosen.times[-1] * chosen.v_max
         return replace(chosen, lookahead=changes.get("lookahead", reach + 1.0))

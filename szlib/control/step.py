@@ -202,8 +202,12 @@ class Step:
     @property
     def residual(self) -> Array:
         """h_{k+1} - (1-gamma)^m h_k for each step of m dt of the plan, shape (obstacles, N_h) [m]."""
-        falls = [each.values for each in self._rows if each.level == Priority.DECAY]
-        return np.concatenate([np.zeros((0, self.asked.settings.N_h)), *falls])
+        s = self.asked.settings
+        n = s.N_h + 1
+        x, y, *_ = self.planned[:n].T
+        h = self.asked.barriers.h(x, y, s.times[:n])
+        keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h])
+        return np.asarray(h[:, 1:] - keep * h[:, :-1])
 
     @cached_property
     def _rows(self) -> list[Rows]:
@@ -361,7 +365,7 @@ class Step:
             "v_max": not self.passively_safe,
             f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one": self.timed_out,
             f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
-            "helps: another goal": scene.goal_blocked,
+            "helps: another goal": self.asked.goal_blocked,
             "walls leave no way to the goal, so the robot goes to the nearest point that it can reach; what "
             "helps: another goal": self.way_length == inf,
             f"{self.rejected} measurements of people were rejected; {self.unknown} are "

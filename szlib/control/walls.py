@@ -24,6 +24,7 @@ from ..core.input_files import printable, read_small
 from .obstacles import SHORTEST_WALL
 from .settings import check_argument
 
+_STRAIGHT = 1e-9  # angle between pieces of one straight wall [rad]
 _PICTURES = "1", "L", "P", "RGB"  # modes of Pillow: of at most 8 bits, not transparent
 
 
@@ -35,7 +36,7 @@ def read_walls(walls: Any) -> Array:
     walls : segments, shape (2, 2) each; polylines, shape (m, 2); Shapely's lines, rings, polygons and
         collections; one or many, nested in any way. The outline of a polygon and the edges of its holes are
         walls; to an `MPCCBF` it is solid, so give a room by its `exterior`. Corners of a line that are closer
-        than `SHORTEST_WALL` count as one.
+        than `SHORTEST_WALL` count as one. Pieces of a straight wall, one after the other, are joined.
 
     Raises
     ------
@@ -55,7 +56,18 @@ def read_walls(walls: Any) -> Array:
     check_argument(is_long.all(), "a wall", lines[~is_long], expected)
     corners, line = shapely.get_coordinates(lines, return_index=True)
     ends = np.stack([corners[:-1], corners[1:]], axis=1)
-    return np.asarray(ends[line[:-1] == line[1:]])
+    return _join_pieces(ends[line[:-1] == line[1:]])
+
+
+def _join_pieces(ends: Array) -> Array:
+    """Segments, of which those that continue the one before on its line are joined to it."""
+    ways = np.diff(ends, axis=1)[:, 0] @ (1, 1j)
+    turns = ways[1:] / ways[:-1]
+    is_straight = (turns.real > 0) & (np.abs(turns.imag) <= _STRAIGHT * turns.real)
+    is_new = np.ones(len(ends), bool)
+    is_new[1:] = ~is_straight | (ends[1:, 0] != ends[:-1, 1]).any(axis=1)
+    is_last = np.append(is_new[1:], True)[: len(ends)]
+    return np.stack([ends[is_new, 0], ends[is_last, 1]], axis=1)
 
 
 def find_solids(walls: Any) -> Any:

@@ -34,8 +34,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS
-from .obstacles import Mask, Obstacles, Point, ellipse_formula, find_places
-from .people import STANDING_SPEED
+from .obstacles import Mask, Obstacles, Point, ellipse_formula
+from .people import STANDING_SPEED, Person, find_places
 from .settings import MPCSettings
 
 Cells = NDArray[np.intp]
@@ -141,6 +141,7 @@ class Map:
     fixed : what is fixed.
     points : which the map must hold, shape (n, 2) [m].
     clearance : of thin walls [m].
+    slack : part of a cell by which a centre may be nearer: a robot fits where no centre does.
 
     Attributes
     ----------
@@ -154,7 +155,13 @@ class Map:
     is_reached : whether it is the goal.
     """
 
-    def __init__(self, fixed: Obstacles, points: Array, clearance: float = inf) -> None:
+    def __init__(
+        self,
+        fixed: Obstacles,
+        points: Array,
+        clearance: float = inf,
+        slack: float = 0.0,
+    ) -> None:
         boxes = [np.vstack(g.kind.bounds(g.numbers, g.offsets)) for g in fixed.groups]
         ends = np.vstack([points - _AROUND, points + _AROUND, *boxes])
         ends = ends[np.isfinite(ends).all(axis=1)]
@@ -171,7 +178,7 @@ class Map:
         self.corner = low - _MARGIN * self.cell
         n = np.ceil(size / self.cell).astype(int) + 2 * _MARGIN
         self.shape = tuple(n.tolist())
-        covered = self._cover(fixed)[2:-2, 2:-2]
+        covered = self._cover(fixed, slack * self.cell)[2:-2, 2:-2]
         self.free = np.pad(~covered | covered.all(), 2)
         self.blocked = ~self.free
         wide = distance_transform_edt(self.free) * self.cell >= _DOOR
@@ -184,11 +191,11 @@ class Map:
         self._pairs = np.stack([numbers[k], neighbours[direction, k]])
         self._lengths = self.cell * np.hypot(*_NEIGHBOURS[direction].T)
 
-    def _cover(self, fixed: Obstacles) -> Mask:
-        """Where h < 0. Each obstacle is measured in the cells of its box."""
+    def _cover(self, fixed: Obstacles, slack: float) -> Mask:
+        """Where h < -`slack` [m]. Each obstacle is measured in the cells of its box."""
         covered = np.zeros(self.shape, bool)
         for kind, numbers, given in fixed.groups:
-            offsets = np.maximum(given, _MOST_SHARE * self.cell)
+            offsets = np.maximum(given - slack, _MOST_SHARE * self.cell)
             first, last = (
                 np.column_stack(self.locate(corners))
                 for corners in kind.bounds(numbers, offsets)
@@ -225,6 +232,13 @@ class Map:
         mask = self.free if among is None else among
         places = np.argwhere(mask) if not mask[cell] else np.array([cell])
         return np.asarray(places[((places - cell) ** 2).sum(axis=1).argmin()])
+
+    def links(self, points: Array) -> bool:
+        """True if free cells close to both `points` are parts of one place, shape (2, 2)."""
+        cells = np.array([self.find_cell(point) for point in points])
+        apart = np.hypot(*(self.centers(cells) - points).T)
+        first, last = self._parts[*cells.T]
+        return bool(first == last and apart.max() < 2 * self.cell)
 
     def measure(self, start: Point, goal: Point, speed: float, price: Array) -> None:
         """Measure the times to the `goal`, or the nearest point that can be reached from the `start`.
@@ -288,18 +302,19 @@ class WayFinder:
         self._standing: Any = None
 
     def find(
-        self, at: Point, goal: Point, zones: Obstacles, groups: Sequence[Hashable]
+        self, at: Point, goal: Point, people: Sequence[Person], zones: Obstacles
     ) -> Heading:
-        """The way from `at` to the `goal` among people with these `zones` and `groups`."""
+        """The way from `at` to the `goal` among `people` with these `zones`."""
         if dist(goal, self._goal) > _GOAL_MOVED:
             self.reset()
             self._goal = goal
         m = self._get_map(at, goal)
-        is_searched = not self._steps or zones.size != self._n_people
+        is_searched = not self._steps or len(people) != self._n_people
         if is_searched:
-            self._search(m, at, goal, Surroundings(zones, groups, at, m, self._s))
+            m = self._loosen(m, at, goal)
+            self._search(m, at, goal, Surroundings(people, zones, at, m, self._s))
             self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
-            self._n_people = zones.size
+            self._n_people = len(people)
         self._steps -= 1
         heading, _ = self._head_for(m, at, self._ways[0].points)
         length = heading.length if m.is_reached else inf
@@ -322,10 +337,22 @@ class WayFinder:
         """The map that holds these points."""
         points = np.array([at, goal])
         if self._map is None or not self._map.holds(points):
-            self._map = Map(self._fixed, points, self._s.r_robot + self._s.eps)
-            self._standing = None
-            self._steps = 0
+            self._map = self._make_map(points)
         return self._map
+
+    def _make_map(self, points: Array, slack: float = 0.0) -> Map:
+        self._is_loose = slack > 0
+        self._standing = None
+        self._steps = 0
+        clearance = self._s.r_robot + self._s.eps
+        return Map(self._fixed, points, clearance, slack)
+
+    def _loosen(self, m: Map, at: Point, goal: Point) -> Map:
+        """The map `m`; if it does not link these places, one whose narrow places are wider by a cell."""
+        points = np.array([at, goal])
+        if not (self._is_loose or m.links(points)):
+            m = self._map = self._make_map(points, slack=0.5)
+        return m
 
     def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
         """Find the ways anew, and choose one."""
@@ -416,8 +443,8 @@ class Surroundings:
 
     Parameters
     ----------
-    zones : of all people.
-    groups : to which they belong, None for somebody of whom this is not known.
+    people : everybody to be respected.
+    zones : theirs.
     at : where the robot is [m].
     m : the map.
     s : settings of the robot.
@@ -433,8 +460,8 @@ class Surroundings:
 
     def __init__(
         self,
+        people: Sequence[Person],
         zones: Obstacles,
-        groups: Sequence[Hashable],
         at: Point,
         m: Map,
         s: MPCSettings,
@@ -445,7 +472,7 @@ class Surroundings:
         self.window = tuple(map(slice, self.low, self.start + size + 1))
         walls = m.centers(np.argwhere(~m.free[self.window]) + self.low)
         walls = walls[::_EVERY, None].repeat(len(_TIMES), axis=1)
-        people = find_places(zones, _TIMES)
+        places = find_places(people, _TIMES)
         x, y = m.cell * np.mgrid[-size : size + 1, -size : size + 1]
         prices = np.zeros((len(people), *x.shape))
         for kind, numbers, offsets in zones.groups:
@@ -453,14 +480,14 @@ class Surroundings:
             d = kind.distance(table[5] + x, table[6] + y, 0.0, *table)
             prices[d < offsets[:, None, None]] = ZONE_SECOND
         prices[:, np.hypot(x, y) < BODY_RADIUS + s.r_robot + s.body_gap] = BODY_SECOND
-        i, j = _find_pairs(people, groups)
-        apart = np.hypot(*(people[i, 0] - people[j, 0]).T)[:, None, None]
+        i, j = _find_pairs(places, [each.group for each in people])
+        apart = np.hypot(*(places[i, 0] - places[j, 0]).T)[:, None, None]
         between = GROUP_SECOND * (np.hypot(x, y) < apart / 2)
         self._prices = np.concatenate([prices, between]).astype(np.float32)
         self._map = m
-        self.people = people
-        self.places = np.concatenate([people, (people[i] + people[j]) / 2])
-        self.around = np.concatenate([people, walls])
+        self.people = places
+        self.places = np.concatenate([places, (places[i] + places[j]) / 2])
+        self.around = np.concatenate([places, walls])
         moved = np.hypot(*(self.places[:, -1] - self.places[:, 0]).T)
         self.stands = moved < STANDING_SPEED * _TIMES[-1]
 
