@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..core.checks import Array
-from .obstacles import Group, Obstacle, Obstacles, Point, Priority
+from .obstacles import Group, Obstacle, Obstacles, Priority
 from .settings import TOLERANCE, MPCSettings
 
 
@@ -116,21 +116,20 @@ def follow_velocities(
     velocity : of the robot now [m/s].
     targets : velocities at the end of each step, shape (N, 2) [m/s].
     """
-    v = velocity
+    # complex numbers: velocities vx + i vy
+    v = complex(*velocity)
     slowest = hypot(*velocity)
-    plan = list[Point]()
+    plan = list[complex]()
+    wanted = (targets @ (1, 1j)).tolist()
     times = s.times[1:].tolist()
-    ends = zip(targets.tolist(), s.step_lengths, times, strict=True)
-    for (wx, wy), length, time in ends:
+    for w, length, time in zip(wanted, s.step_lengths, times, strict=True):
         dt = s.dt * length
         limit = max(s.v_max, slowest - s.a_max * time)
-        share = min(1.0, limit / (hypot(wx, wy) or 1.0))
-        dx = share * wx - v[0]
-        dy = share * wy - v[1]
-        seconds = max(dt, abs(dx) / s.a_max, abs(dy) / s.a_max)
-        plan.append((dx / seconds, dy / seconds))
-        v = v[0] + dt * dx / seconds, v[1] + dt * dy / seconds
-    return np.array(plan).clip(-s.a_max, s.a_max)
+        change = min(1.0, limit / (hypot(w.real, w.imag) or 1.0)) * w - v
+        seconds = max(dt, abs(change.real) / s.a_max, abs(change.imag) / s.a_max)
+        plan.append(change / seconds)
+        v += dt * change / seconds
+    return np.array(plan).view(float).reshape(-1, 2).clip(-s.a_max, s.a_max)
 
 
 def plan_braking(s: MPCSettings, velocity: Sequence[float]) -> Array:
