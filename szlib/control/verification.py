@@ -80,11 +80,13 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
     for kind, _, offsets in scene.barriers.groups:
         own = h[first : first + len(offsets)]
         falls = own[:, 1:] - (1 - s.gamma) ** lengths * own[:, :-1]
-        floors = own[:, 1 : s.N_h + 1]
+        last = s.N_h if kind.has_barrier else s.N
+        floors = own[:, 1 : last + 1]
         if kind.priority == Priority.WALL:
             floors = own[:, 1:] - stop**lengths * own[:, :-1]
         yield Rows(kind.priority, kind.kind, first, floors)
-        yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
+        if kind.has_barrier:
+            yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
         first += len(offsets)
     if len(gaps):
         yield Rows(Priority.BODY, "body", 0, gaps[:, 1:])
