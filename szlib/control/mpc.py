@@ -383,7 +383,7 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         control = plan.inputs[0]
-        is_wall_far, is_body_far = self._find_far(scene)
+        is_wall_far, is_body_far = self._find_far(scene, control)
         if is_wall_far and is_body_far:
             return False, (True, True)
         bodies = find_bodies(scene.zones, self.settings)
@@ -407,16 +407,17 @@ class MPCCBF(Controller):
         is_safe = rest[1].is_safe
         return True, (walls_safe, walls_safe and is_safe)
 
-    def _find_far(self, scene: Scene) -> tuple[bool, bool]:
+    def _find_far(self, scene: Scene, control: Array) -> tuple[bool, bool]:
         """Whether the robot can touch nothing fixed before it rests, and whether it can touch no body.
 
-        Within a step of any control and the braking after it, it goes no farther than `reach`.
+        Within a step of `control` and the braking after it, it goes no farther than `reach`.
         """
-        s = self._s
-        x, y, vx, vy = scene.state
-        fastest = hypot(vx, vy) + hypot(s.a_max, s.a_max) * s.dt
-        stop = fastest / s.a_max
-        reach = fastest * (s.dt + stop / 2) + _BRAKING_ERROR
+        s, (x, y, vx, vy), (ax, ay) = self._s, scene.state, control.tolist()
+        last_vx = vx + s.dt * ax
+        last_vy = vy + s.dt * ay
+        stop = max(abs(last_vx), abs(last_vy)) / s.a_max
+        last = hypot(last_vx, last_vy)
+        reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
         reach += s.r_robot - self.settings.r_robot
         contact = BODY_RADIUS + self.settings.r_robot + reach
         time = stop + 2 * s.dt

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import inf
+from math import hypot, inf
 from threading import Lock
 from typing import Any, NamedTuple
 
@@ -118,14 +118,14 @@ def follow_velocities(
     """
     # complex numbers: velocities vx + i vy
     v = complex(*velocity)
-    slowest = abs(v)
+    slowest = hypot(*velocity)
     plan = list[complex]()
     wanted = (targets @ (1, 1j)).tolist()
     times = s.times[1:].tolist()
     for w, length, time in zip(wanted, s.step_lengths, times, strict=True):
         dt = s.dt * length
         limit = max(s.v_max, slowest - s.a_max * time)
-        change = min(1.0, limit / (abs(w) or 1.0)) * w - v
+        change = min(1.0, limit / (hypot(w.real, w.imag) or 1.0)) * w - v
         seconds = max(dt, abs(change.real) / s.a_max, abs(change.imag) / s.a_max)
         plan.append(change / seconds)
         v += dt * change / seconds
