@@ -397,7 +397,7 @@ class Planner:
             if is_converged or timed_out:
                 break
         self._on_speed[:] = program.multipliers
-        inputs = program.inputs.clip(-s.a_max, s.a_max)
+        inputs = np.minimum(np.maximum(program.inputs, -s.a_max), s.a_max)
         if not is_converged:
             states = build_horizon(s).states(np.array(question.state), inputs)
             inputs = follow_velocities(s, question.state[2:], states[1:, 2:])

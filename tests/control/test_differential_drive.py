@@ -599,3 +599,11 @@ def test_a_robot_that_overlaps_somebody_rests_while_another_person_is_unknown():
         step = drive.step(own, GOAL, [[0.156, -0.233, 0.0, 0.0], [np.nan] * 4])
         own = drive.robot.advance(own, step.control, settings.dt)
     assert own[:3] == pytest.approx(0.0, abs=1e-9) and step.unknown == 1
+
+
+def test_explain_names_the_goal_that_was_given():
+    """Near the goal the wheels plan for a point beside it."""
+    drive = szlib.DifferentialDrive(ZONE)
+    step = drive.step((2.5, 0.0, 1.5), (3.0, 0.0), [szlib.Person((3.0, 0.5))])
+    assert step.scene.goal == (3.0, 0.0) and step.goal_blocked
+    assert "the goal (3.0, 0.0) cannot be reached" in step.explain()

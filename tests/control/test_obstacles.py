@@ -557,3 +557,42 @@ def test_obstacles_of_one_class_may_have_different_numbers():
     np.testing.assert_allclose(
         step.h, np.array([27, 18, 27]) ** 0.5 - S.r_robot - S.eps
     )
+
+
+@pytest.mark.parametrize("level", [Priority.WALL, Priority.BODY, Priority.ZONE])
+@pytest.mark.parametrize("settings", [S, szlib.MPCSettings.among_people()])
+def test_an_obstacle_without_a_barrier_condition_is_verified_and_run(level, settings):
+    class Rug(Obstacle):
+        kind, priority, has_barrier = "rug", level, False
+
+        @staticmethod
+        def distance(x, y, t, px, py, radius):
+            return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - radius
+
+    people = (szlib.Person((3, 1), (-0.5, 0)),)
+    rug = (Rug(2.0, 0.1, 0.4),)
+    scenario = szlib.Scenario("rug", (0, 0, 0, 0), (4, 0), people, obstacles=rug)
+    controller = szlib.MPCCBF(ZONE, obstacles=rug, settings=settings)
+    step = controller.step((0, 0, 0.5, 0), (4, 0), people)
+    assert step.verify().faults == () and step.residual.shape == (2, settings.N_h)
+    assert szlib.simulate(scenario, controller).metrics()["outcome"] == "arrived"
+
+
+def test_decay_is_no_priority_of_an_obstacle():
+    with pytest.raises(szlib.SolverError, match="priority of rug must be WALL, BODY"):
+
+        class Rug(Obstacle):
+            priority = Priority.DECAY
+
+
+def test_walls_and_obstacles_that_are_assigned_hold():
+    controller = szlib.MPCCBF(ZONE)
+    controller.walls = [[(2, -3), (2, 3)]]
+    controller.obstacles = [HalfPlane((0.0, -2.0), (0.0, 1.0))]
+    step = controller.step((0, 0, 0, 0), (5, 0))
+    assert [each.kind for each in step.obstacles] == ["wall", "half-plane"]
+    controller.set_walls([])
+    assert [each.kind for each in controller.obstacles] == ["half-plane"]
+    with pytest.raises(szlib.SolverError, match="an obstacle must be an Obstacle"):
+        controller.obstacles = [3]
+    assert len(controller.obstacles) == 1 and len(controller.walls) == 0

@@ -490,3 +490,8 @@ def test_people_that_are_no_rows_are_refused(people):
 def test_a_person_with_unusable_numbers_raises_an_error(arguments, message):
     with pytest.raises(szlib.SolverError, match=message):
         szlib.Person(**arguments)
+
+
+def test_a_group_that_is_no_name_is_refused():
+    with pytest.raises(szlib.SolverError, match=r"a group must be hashable.*\[1\]"):
+        szlib.Person((0.0, 0.0), group=[1])

@@ -157,3 +157,8 @@ def test_a_reference_zone_is_a_zone() -> None:
     assert szlib.MPCCBF(zone).zone == zone.ellipse
     with pytest.raises(szlib.ZoneError, match=r"\.ellipse\(speed\)"):
         szlib.MPCCBF(3.0)
+
+
+def test_no_people_are_predicted_as_no_people() -> None:
+    assert predict([], [1.0], []) == []
+    assert predict(np.zeros((0, 4)), [1.0, 2.0], np.zeros((0, 2, 2))) == []

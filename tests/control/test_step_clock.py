@@ -203,7 +203,7 @@ def test_a_drive_brings_a_late_state_to_the_present_along_its_arcs():
 
 
 @pytest.mark.parametrize(
-    "age", [-0.1, OLDEST_STATE + 0.1, np.nan, "x", None, [0.1, 0.2]]
+    "age", [-0.11, OLDEST_STATE + 0.1, np.nan, "x", None, [0.1, 0.2]]
 )
 def test_an_age_that_cannot_be_used_is_refused(age):
     with pytest.raises(szlib.SolverError, match="state_age must"):
@@ -271,3 +271,18 @@ def test_a_robot_that_arrived_approaches_or_has_a_new_goal_is_not_stuck():
     assert controller.step((0, 0, 0, 0), (0.0, 3.0), now=1.7e9).stuck == 0, (
         "a clock that jumps is no waiting"
     )
+
+
+def test_a_robot_that_follows_a_goal_is_not_stuck():
+    controller, x = szlib.MPCCBF(ZONE), np.zeros(4)
+    for k in range(200):
+        step = controller.step(x, (2 + 0.08 * k, 0.0))
+        x = advance(x, step.control, 0.1)
+    assert step.stuck == 0.0 and x[0] > 14.0
+
+
+def test_a_state_that_is_a_little_ahead_of_now_is_that_of_now():
+    ahead, now = (
+        szlib.MPCCBF(ZONE).step(START, GOAL, state_age=age) for age in (-0.05, 0.0)
+    )
+    assert ahead.control.tolist() == now.control.tolist()

@@ -205,7 +205,7 @@ BOX = shapely.box(0, 0, 4, 2)
         ([shapely.LineString([(0, 0), (1, 0)]), [(2, 2), (3, 3)]], 2),
         (BOX, 4),
         (BOX.difference(shapely.box(1, 0.5, 2, 1)), 8),
-        (shapely.MultiLineString([[(0, 0), (1, 0)], [(2, 0), (3, 0), (4, 0)]]), 3),
+        (shapely.MultiLineString([[(0, 0), (1, 0)], [(2, 0), (3, 0), (4, 1)]]), 3),
         (shapely.GeometryCollection([BOX, shapely.LineString([(9, 9), (8, 8)])]), 5),
         (shapely.union(BOX, shapely.box(8, 0, 9, 1)), 8),
         (BOX.exterior, 4),
@@ -353,3 +353,15 @@ def test_a_coloured_cell_is_as_dark_as_the_mean_of_its_channels(tmp_path):
 def test_a_wall_shorter_than_a_millimetre_is_refused(length):
     with pytest.raises(szlib.SolverError, match=r"0\.001 m long or longer"):
         read_walls([(0, 0), (length, 0)])
+
+
+@pytest.mark.parametrize("piece", [0.02, 0.3, 1.0])
+def test_pieces_of_a_straight_wall_are_one_wall(piece: float) -> None:
+    x = np.linspace(-5.0, 5.0, round(10 / piece) + 1)
+    line = np.column_stack([x, 0.3 * x])
+    whole = [[line[0].tolist(), line[-1].tolist()]]
+    assert read_walls(line).tolist() == whole
+    assert read_walls(np.stack([line[:-1], line[1:]], axis=1)).tolist() == whole
+    there_and_back = [(0, 0), (2, 0), (1, 0)]
+    gap = [[(0, 0), (1, 0)], [(1.1, 0), (2, 0)]]
+    assert len(read_walls(there_and_back)) == len(read_walls(gap)) == 2

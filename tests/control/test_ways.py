@@ -9,12 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 import szlib
-from szlib.control import HalfPlane, Obstacles, Wall, Zone, read_walls
-from szlib.control.obstacles import Group, find_places
+from szlib.control import (
+    HalfPlane,
+    Obstacles,
+    Prediction,
+    Wall,
+    Zone,
+    read_walls,
+    walls_from_grid,
+)
+from szlib.control.controller import advance
+from szlib.control.obstacles import Group
+from szlib.control.people import find_places
 from szlib.control.ways import (
     CELL,
     GROUP_DISTANCE,
@@ -339,10 +350,8 @@ def test_a_route_of_any_length_is_followed() -> None:
 
 def test_people_who_touch_are_no_pair_to_pass_between() -> None:
     """Of 200 people at one place there would be 19,900 pairs, each with prices of its own."""
-    rows = [
-        Zone(*Zone.place(ZONE, (x, 0.0), 0.0, (0.0, 0.0))) for x in (0.0, 0.45, 1.2)
-    ]
-    people = find_places(Obstacles.of(rows, AMONG), np.array([0.0, 0.1]))
+    rows = [szlib.Person((x, 0.0)) for x in (0.0, 0.45, 1.2)]
+    people = find_places(rows, np.array([0.0, 0.1]))
     assert _find_pairs(people, [None] * 3).tolist() == [[0, 1], [2, 2]]
     assert _find_pairs(people[[0] * 200], [None] * 200).shape == (2, 0)
 
@@ -522,7 +531,7 @@ def test_a_way_is_kept_until_another_is_clearly_cheaper() -> None:
         numbers = Zone.place(ROUND, person.position, 0.0, person.velocity)
         zones = Obstacles.of([Zone(*numbers)], AMONG)
         for _ in range(4):
-            found = finder.find((-3.0, 0.0), (3.0, 0.0), zones, [None])
+            found = finder.find((-3.0, 0.0), (3.0, 0.0), [person], zones)
         way = found.ways[0]
         sides.append(np.sign(np.interp(0.0, *way.points.T) - y))
         assert way.cost < min(each.cost for each in found.ways) + SWITCH_GAIN
@@ -557,7 +566,7 @@ def test_between_two_people_who_are_together_a_way_has_its_price(apart, rates) -
         [Zone(*Zone.place(ROUND, p.position, 0.0, p.velocity)) for p in people], AMONG
     )
     found = Map(Obstacles((), 0.3), np.zeros((1, 2)), 0.12)
-    near = Surroundings(zones, [None, None], (0.0, 0.0), found, AMONG)
+    near = Surroundings(people, zones, (0.0, 0.0), found, AMONG)
     rows = np.ones(len(near.places), bool)
     price = near.find_prices(rows, np.array([2.0]), np.zeros(2, int), found.shape)
     places = found.centers(np.argwhere(price[0] == GROUP_SECOND))
@@ -778,3 +787,62 @@ def test_a_reset_controller_is_as_a_new_one():
     one, other = (each.step((0, 0, 0, 0), (6, 0)) for each in (used, new))
     np.testing.assert_array_equal(one.target, other.target)
     np.testing.assert_array_equal(one.control, other.control)
+
+
+def drive_alone(
+    walls: Any, start: ArrayLike, goal: ArrayLike, r_robot: float, seconds: float
+) -> float:
+    """Time in which a robot arrives; inf if it does not."""
+    settings = szlib.MPCSettings.among_people(time_limit=np.inf, r_robot=r_robot)
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
+    x = np.array([*start, 0.0, 0.0])
+    for k in range(round(10 * seconds)):
+        x = advance(x, controller.step(x, goal).control, 0.1)
+        if np.hypot(*(x[:2] - goal)) < 0.12:
+            return k / 10
+    return np.inf
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("r_robot", [0.3, 0.5])
+def test_a_corridor_at_any_angle_a_little_wider_than_the_robot_is_passed(
+    r_robot: float,
+) -> None:
+    """No cell's centre may be free: it is 10 cm wider than the robot and its margins."""
+    w = r_robot + 0.1
+    for angle in np.arange(12) * np.pi / 12:
+        turn = np.array(
+            [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+        )
+        walls = np.array([[(-5, w), (5, w)], [(-5, -w), (5, -w)], [(-5, w), (-5, -w)]])
+        start, goal = np.array([(-3.0, 0.0), (7.0, -0.4)]) @ turn
+        assert drive_alone(walls @ turn, start, goal, r_robot, 20.0) < 20.0, angle
+
+
+def test_a_way_never_leads_through_a_wall_to_the_nearest_free_cell() -> None:
+    a = 0.57
+    store = [[(-4, -a), (-4, a)], [(-4, a), (4, a)], [(4, -a), (-4, -a)]]
+    assert drive_alone(store, (0.3, 3.0), (0.0, 0.0), 0.5, 40.0) < 20.0
+    narrow = [[(0, y), (6, y)] for y in (0.555, -0.555)]
+    assert drive_alone(narrow, (3.0, 0.0), (9.0, 0.0), 0.5, 20.0) < 10.0
+
+
+@pytest.mark.parametrize("slope", [0.3, 0.8])
+def test_a_corridor_of_a_grid_that_is_not_along_it_is_passed(slope: float) -> None:
+    """Its outline has many short walls, whose conditions contradict each other at first."""
+    y, x = np.mgrid[0:200, 0:200] * 0.05 - 4.975
+    across = np.abs(y - slope * x) / np.hypot(1, slope)
+    walls = walls_from_grid((across > 0.65) & (across < 0.9), 0.05, (-5, -5, 0))
+    along = np.array([1, slope]) / np.hypot(1, slope)
+    assert drive_alone(walls, -3.5 * along, 3.5 * along, 0.3, 30.0) < 20.0
+
+
+def test_ways_know_a_prediction_beyond_the_horizon() -> None:
+    """Somebody who is predicted to stop does not walk on."""
+    times = np.arange(1.0, 11.0)
+    stops = Prediction(times, np.tile([1.0, 0.0], (10, 1)))
+    person = szlib.Person((0.0, 0.0), (1.0, 0.0), prediction=stops)
+    later = np.array([0.5, 3.0, 6.0, 10.0])
+    (places,) = find_places([person], later)
+    assert places == pytest.approx(np.array([(0.5, 0), (1, 0), (1, 0), (1, 0)]))
+    assert places[2] == pytest.approx(person.after(6.0).position)
