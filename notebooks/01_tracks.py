@@ -180,8 +180,8 @@ print(f"Anna at 2.00 s: x = {np.interp(2.00, [1.97, 2.01], [4.96, 5.00]):.2f} m"
 
 # %% [markdown]
 # `szlib.read_tracks(file)` does this for everybody at all multiples of 0.1 s, and takes the velocity over 1 s. It reads ATC raw
-# files, the public day at 1 Hz, EWAP `obsmat`, tidy tables and others. A person is a pair *(day, id)*; `t` is in seconds
-# since 1970, `x` and `y` are in m, `vx` and `vy` in m/s.
+# files, the public day at 1 Hz, EWAP `obsmat`, tidy tables and others. A person is a pair *(day, id)*; `t` is in seconds, since
+# 1970 where the file has dates, `x` and `y` are in m, `vx` and `vy` in m/s.
 
 # %%
 people[["day", "id", "t", "x", "y", "vx", "vy"]].head(3).round(2)
@@ -255,7 +255,7 @@ Markdown(
     f"| a jump of 3 m | nothing | a speed of {fastest['a jump']:.1f} m/s |\n"
     "| swapped ids | nothing | both people turn round at one moment, near each other |\n"
     "| a gap of 1.5 s | ends the track, and begins a new one | it is counted below |\n"
-    "| a wrong unit | refuses the file, and says which unit to pass | the message |\n"
+    "| a wrong unit | refuses the file if people would be too slow or too fast, and says which unit to pass | the message |\n"
     "| a wrong clock | refuses the file | the message |\n\nDoubled rows and missing numbers are left out and counted.\n\n</details>"
 )
 

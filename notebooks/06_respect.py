@@ -578,8 +578,7 @@ number cannot tell a distance from a time.
 The other two can. The **nearest approach** is {spread} at Grand Central, at each speed: a zone says how near people *pass*.
 (The radius $R$ above is larger: at $R$ the ratio is above 1/2, with the careless and those who step aside.)
 The **time to collision** says when they turn: {time.min():.1f} to {time.max():.1f} s before they touch, later than on the
-black line ({least:.1f} s or more), where everybody knows the way beforehand. On the ATC day too few are left to say it:
-there people turn earlier.
+black line ({least:.1f} s or more), where everybody knows the way beforehand. The ATC day has too few pairs for this question.
 
 A robot needs both: the zone for how near it passes, a time for how early it gives way. The barrier of chapter 07 has
 both: it lets the robot use up a share of the distance to the zone in each step.

@@ -79,6 +79,7 @@ class MPCSettings:
     lookahead : the plan heads for the point of the way that lies at most this far ahead [m]: see
         `szlib.control.ways`. `inf`, as in the paper: no way is looked for, and the plan heads for the goal.
         On a large map a new goal takes some 0.1 s, at most some 0.5 s; 1 s if r_robot + eps is nearly 0.
+        Towards a goal that is some 500 m away the map is coarse, and doors are closed: give a nearer one.
     eps : margin for the error of the approximate distances [m].
     margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
         least eps (see `Wall.margin`). "paper": eps, which allows overlaps with the ends of walls shorter
