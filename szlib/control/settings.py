@@ -246,7 +246,7 @@ class MPCSettings:
         is_used = not (counts and changes.get("grid", True))
         check_argument(is_used, "N and N_h", changes, expected)
         chosen = cls(**own | changes)
-        reach = chosen.times[-1] * chosen.v_max
+        reach = sum(own["grid"]) * chosen.dt * chosen.v_max
         return replace(chosen, lookahead=changes.get("lookahead", reach + 1.0))
 
     @cached_property
