@@ -141,11 +141,13 @@ class Map:
     fixed : what is fixed.
     points : which the map must hold, shape (n, 2) [m].
     clearance : of thin walls [m].
-    slack : part of a cell by which a centre may be nearer: a robot fits where no centre does.
+    slack : by which h may be negative in the centre of a free cell, in cells: a robot may fit in a place that
+        is too narrow for the centres.
 
     Attributes
     ----------
-    free : whether h >= 0 in the centre of a cell, shape (nx, ny); False in the two rows at each edge.
+    free : whether h >= 0, but for the slack, in the centre of a cell, shape (nx, ny); False in the two rows
+        at each edge.
     is_narrow : whether it is free, but in no free disc of the radius `_DOOR`.
     price : of a second in a cell, because of people who stand [s].
     blocked : whether a cell is not free, or in the body of somebody who stands.
@@ -348,7 +350,7 @@ class WayFinder:
         return Map(self._fixed, points, clearance, slack)
 
     def _loosen(self, m: Map, at: Point, goal: Point) -> Map:
-        """The map `m`; if it does not link these places, one whose narrow places are wider by a cell."""
+        """The map `m`; if it does not link these places, one with half a cell of slack."""
         points = np.array([at, goal])
         if not (self._is_loose or m.links(points)):
             m = self._map = self._make_map(points, slack=0.5)
