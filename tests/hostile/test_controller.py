@@ -34,7 +34,9 @@ def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("island", "place"), [(119, 3), (142, 5), (223, 25)])
+@pytest.mark.parametrize(
+    ("island", "place"), [(119, 3), (142, 5), (223, 25), (1341, 17)]
+)
 def test_a_world_that_once_broke_a_claim_breaks_none(island, place):
     """In the first one a robot that creeps at 1.05 mm/s was said to rest.
 

@@ -204,6 +204,36 @@ def test_chains_that_do_not_agree_are_undecided(careful):
     assert "the draws of the posterior do not agree" in verdict.sentence
 
 
+@pytest.mark.parametrize(("ahead", "expected"), [(0.2, "usable"), (-0.35, "undecided")])
+def test_a_zone_that_is_far_ahead_or_behind_is_undecided(careful, ahead, expected):
+    moved = {
+        speed: replace(ellipse, center=(ahead, 0.0))
+        for speed, ellipse in careful.ellipses.items()
+    }
+    verdict = replace(careful, ellipses=moved).verdict(SPEED)
+    assert verdict == expected
+    assert ("centre is -0.35 m ahead" in verdict.sentence) == (expected == "undecided")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::szlib.DataWarning")
+@pytest.mark.parametrize("fault", ["noise", "wrong places"])
+def test_positions_that_err_move_the_zone_and_it_is_undecided(tmp_path, fault):
+    """The true zone is 0.95 m long; it would be called 0.65 to 0.7 m, far ahead or behind."""
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv"))
+    rng = np.random.default_rng(0)
+    places = tracks[["x", "y"]].to_numpy()
+    if fault == "noise":
+        places = places + rng.normal(0, 0.1, places.shape)
+    else:
+        places[rng.random(len(places)) < 0.002] = 0.0
+    rows = tracks[["t", "id"]].assign(x=places[:, 0], y=places[:, 1])
+    again = szlib.read_tracks(rows)
+    zone = szlib.SocialZone.from_tracks(again, area="auto", speeds=[SPEED])
+    assert zone.verdict(SPEED) == "undecided"
+    assert "as where positions err" in zone.verdict(SPEED).sentence
+
+
 def test_implausible_data_are_undecided(careful):
     text = "people move at 4.18 m/s: feet?"
     funnel = [{"stage": f"warning: {text}", "entered": 1, "kept": 1, "rejected": {}}]
