@@ -256,8 +256,10 @@ class MPCSettings:
 
     @cached_property
     def times(self) -> Array:
-        """Time of each state of the plan, from now, shape (N+1,) [s]."""
-        return np.asarray(self.dt * np.cumsum((0, *self.step_lengths)))
+        """Time of each state of the plan, from now, shape (N+1,), read-only [s]."""
+        times = np.asarray(self.dt * np.cumsum((0, *self.step_lengths)))
+        times.flags.writeable = False
+        return times
 
     def badges(self) -> dict[str, str]:
         """The source of each value, by name.
