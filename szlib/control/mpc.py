@@ -180,6 +180,7 @@ class MPCCBF(Controller):
 
     @walls.setter
     def walls(self, walls: Any) -> None:
+        """Replace the walls: see `set_walls`."""
         self.set_walls(walls)
 
     @property
@@ -189,6 +190,7 @@ class MPCCBF(Controller):
 
     @obstacles.setter
     def obstacles(self, obstacles: Iterable[Obstacle]) -> None:
+        """Replace what else stands still, from the next step on."""
         self._check_thread()
         self._take(self._given_walls, obstacles)
 
