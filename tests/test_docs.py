@@ -196,7 +196,7 @@ def test_the_five_results_are_those_of_the_tables():
     zones = papers.groupby("source")["draws"].max().sum()
     assert (papers["held"] == papers["draws"]).all() and code["held"].sum() == 0
     assert (
-        f"keeps out of all {zones} zones; with its code's gamma of 0.4, out of none"
+        f"keeps out of all {zones} zones; with the gamma of the paper's code, 0.4, of none"
         in text
     )
 
@@ -229,4 +229,4 @@ def test_the_five_results_are_those_of_the_tables():
         100 * walkers.loc["among people", name] for name in ("mean", "low", "high")
     )
     assert f"reached {mean:.1f} % of goals ({low:.1f} to {high:.1f})" in text
-    assert f"the defaults {100 * walkers.loc['MPC-CBF', 'mean']:.1f} %" in text
+    assert f"`MPCSettings()` {100 * walkers.loc['MPC-CBF', 'mean']:.1f} %" in text
