@@ -170,7 +170,8 @@ class MPCCBF(Controller):
         self.tracker = tracker or Tracker()
         self._thread = dict[str, int]()
         self._planner = Planner(self._s)
-        self._take(walls, obstacles)
+        self._take_walls(walls)
+        self._take_obstacles(obstacles)
         self.reset()
 
     @property
@@ -192,27 +193,26 @@ class MPCCBF(Controller):
     def obstacles(self, obstacles: Iterable[Obstacle]) -> None:
         """Replace what else stands still, from the next step on."""
         self._check_thread()
-        self._take(self._given_walls, obstacles)
+        self._take_obstacles(obstacles)
 
     def _plan_with(self, s: MPCSettings) -> MPCSettings:
         """Settings of the plan of a robot with the settings `s`."""
         return s
 
-    def _take(self, walls: Any, obstacles: Iterable[Obstacle]) -> None:
+    def _take_walls(self, walls: Any) -> None:
         segments = read_walls(walls)
-        items: list[Obstacle] = [
-            Wall(*ends) for ends in segments.reshape(-1, 4).tolist()
-        ]
+        self._solids = find_solids(walls)
+        self._segments = segments
+
+    def _take_obstacles(self, obstacles: Iterable[Obstacle]) -> None:
+        """Build what is fixed, of the walls and these `obstacles`."""
         others = tuple(obstacles)
         for each in others:
-            check_argument(
-                isinstance(each, Obstacle), "an obstacle", each, "an Obstacle"
-            )
-        items += others
-        self._given_walls = walls
-        self._segments = segments
+            is_one = isinstance(each, Obstacle)
+            check_argument(is_one, "an obstacle", each, "an Obstacle")
         self._obstacles = others
-        self._solids = find_solids(walls)
+        ends = self._segments.reshape(-1, 4).tolist()
+        items = [*(Wall(*each) for each in ends), *others]
         self._fixed = Obstacles.of(items, self._s)
         self._fixed_of_disc = Obstacles.of(items, self.settings)
         self._ways = WayFinder(self._fixed, self._s)
@@ -232,7 +232,8 @@ class MPCCBF(Controller):
             thread.
         """
         self._check_thread()
-        self._take(walls, self._obstacles)
+        self._take_walls(walls)
+        self._take_obstacles(self._obstacles)
 
     def _check_thread(self) -> None:
         if self._thread.setdefault("first", get_ident()) != get_ident():
