@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.control import obstacles
 
 PACKAGE = Path(szlib.__file__).parent
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
@@ -193,6 +194,8 @@ LONG = "szlib.zones.social_zone"  # its examples fit zones
 )
 def test_every_example_runs(module, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # a class of an example must not take the place of one of another test
+    monkeypatch.setattr(obstacles, "_KINDS", obstacles._KINDS.copy())
     matplotlib.use("Agg")
     runner = doctest.DocTestRunner(
         optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS, verbose=False
