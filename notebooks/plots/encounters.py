@@ -248,7 +248,7 @@ def plot_distance_by_direction(samples: pd.DataFrame, *, r_max: float = 2.0, ax:
     close = samples[samples["distance"] <= r_max]
     angle = np.degrees(close["los_angle"])
     edges = np.linspace(-180, 180, 73), np.linspace(0, r_max, _N_BINS + 1)
-    _draw_density(ax, angle, close["distance"], edges)
+    _draw_density(ax, angle, close["distance"], edges, ("deg", "m"))
     sector = (np.floor(angle / 15) * 15 + 7.5).rename("sector")
     nearest = close.groupby([sector, "encounter"])["distance"].min().groupby("sector")
     edge = nearest.quantile(0.05).where(nearest.size() >= 5).reindex(np.arange(-172.5, 180, 15))
@@ -274,11 +274,18 @@ def plot_distance_by_direction(samples: pd.DataFrame, *, r_max: float = 2.0, ax:
     return ax
 
 
-def _draw_density(ax: Axes, x: pd.Series, y: pd.Series, edges: tuple[np.ndarray, np.ndarray]) -> None:
+def _draw_density(
+    ax: Axes,
+    x: pd.Series,
+    y: pd.Series,
+    edges: tuple[np.ndarray, np.ndarray],
+    units: tuple[str, str] = ("m", "m"),
+) -> None:
     """Draw the number of samples in each cell on a log scale; empty cells stay white."""
     counts = np.histogram2d(x, y, bins=edges)[0].T
     shown = np.ma.masked_equal(counts, 0)
     top = max(float(counts.max(initial=0)), 2.0)
     image = ax.pcolormesh(*edges, shown, cmap=f"{SEQUENCE}_r", norm=LogNorm(1, top), rasterized=True)
-    cell = " x ".join(f"{edge[1] - edge[0]:.2g}" for edge in edges)
+    sides = (f"{edge[1] - edge[0]:.2g} {unit}" for edge, unit in zip(edges, units, strict=True))
+    cell = " x ".join(sides)
     ax.figure.colorbar(image, ax=ax, shrink=0.9, label=f"samples in a cell of {cell} (log scale)")
