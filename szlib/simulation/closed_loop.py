@@ -100,9 +100,9 @@ def simulate(
 
     Raises
     ------
-    SolverError : the controller has other walls or obstacles, or gives a control that cannot be used. For an
-        `MPCCBF` also: the start violates a barrier or the speed limit, or the goal cannot be reached, because
-        it lies too close to a wall or in the zone of a person who stands.
+    SolverError : `scenario` is no `Scenario`, or the controller has other walls or obstacles, or gives a
+        control that cannot be used. For an `MPCCBF` also: the start violates a barrier or the speed limit, or
+        the goal cannot be reached, because it lies too close to a wall or in the zone of a person who stands.
 
     Examples
     --------
@@ -113,6 +113,10 @@ def simulate(
     >>> log.success, log.metrics()["passing_side"]
     (True, 'right')
     """
+    is_one = isinstance(scenario, Scenario)
+    require(
+        is_one, "scenario", scenario, "a Scenario, as in szlib.SCENARIOS", SolverError
+    )
     controller = as_controller(controller)
     if controller.walls is not None and not np.array_equal(
         controller.walls, scenario.walls

@@ -21,7 +21,8 @@ from ..control import (
     Wall,
     Zone,
 )
-from ..control.obstacles import check_wall, euclidean_segment_formula
+from ..control.obstacles import euclidean_segment_formula
+from ..control.walls import read_walls
 from ..core.checks import Array, check_array, require
 from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
@@ -59,7 +60,7 @@ class Scenario:
     start : (x, y, vx, vy) of the robot [m, m/s].
     goal : (x, y) [m].
     people : all people, at time 0.
-    walls : segments, shape (n, 2, 2) [m].
+    walls : segments, shape (n, 2, 2) [m]; or anything else that `read_walls` accepts.
     claims : what the paper claims of it.
     title : title of its figures.
     duration : time limit of a run [s].
@@ -92,9 +93,7 @@ class Scenario:
         arrays = {
             "start": check_array("start", self.start, (4,)),
             "goal": check_array("goal", self.goal, (2,)),
-            "walls": np.array([check_wall(wall) for wall in self.walls]).reshape(
-                -1, 2, 2
-            ),
+            "walls": read_walls(self.walls),
         }
         for name, array in arrays.items():
             array.setflags(write=False)
@@ -102,8 +101,7 @@ class Scenario:
         object.__setattr__(self, "people", tuple(self.people))
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         value = self.duration
-        expected = "a positive number of seconds"
-        require(0 < value < np.inf, "duration", value, expected, SolverError)
+        require(0 < value < np.inf, "duration [s]", value, "positive", SolverError)
 
     @property
     def fixed(self) -> tuple[Obstacle, ...]:
@@ -264,8 +262,8 @@ class Worlds:
             Zone(*Zone.place(zone, p.position, p.heading or 0.0, p.velocity))
             for p in world.people
         ]
-        margins = [each.margin(_ROBOT) for each in world.fixed]
-        robot = replace(_ROBOT, eps=max([_ROBOT.eps, *margins]), margin="paper")
+        margins = [_ROBOT.eps, *(each.margin(_ROBOT) for each in world.fixed)]
+        robot = replace(_ROBOT, eps=max(margins), margin="paper")
         start, velocity = np.split(world.start, 2)
         stop = start + velocity * np.hypot(*velocity) / (2 * _ROBOT.a_max)
         places = np.array([start, stop, world.goal])

@@ -282,13 +282,26 @@ def test_invalid_starts_and_goals_are_rejected(change, message):
     [
         ({"start": (0, 0)}, "start must have shape"),
         ({"goal": (np.nan, 0)}, "goal must be finite"),
-        ({"walls": [((1, 1), (1, 1))]}, "two different end points"),
-        ({"duration": -1}, "duration must be a positive"),
+        ({"walls": [((1, 1), (1, 1))]}, "a wall must be 0.001 m long or longer"),
+        ({"duration": -1}, r"duration \[s\] must be positive; got -1"),
     ],
 )
 def test_invalid_scenarios_are_rejected(change, message):
     with pytest.raises(szlib.SolverError, match=message):
         replace(szlib.SCENARIOS["passing"], **change)
+
+
+def test_the_name_of_a_scenario_is_no_scenario():
+    with pytest.raises(szlib.SolverError, match=r"must be a Scenario.*got 'corridor'"):
+        szlib.simulate("corridor", szlib.MPCCBF(ZONE))
+
+
+def test_walls_of_a_scenario_are_those_of_a_controller_that_is_given_the_same():
+    room = shapely.box(-6, -3, 6, 3).exterior
+    scenario = replace(szlib.SCENARIOS["passing"], walls=room)
+    assert len(scenario.walls) == 4
+    assert run(scenario).success
+    assert szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=room)).success
 
 
 def test_a_controller_with_other_walls_is_rejected():
