@@ -459,7 +459,44 @@ display(movie)
 # costs more than it saves. Then the plan with a price is the plan with the hard constraint, wherever there is one
 # (Nocedal & Wright, *Numerical Optimization*, ch. 17). The prices of `among_people()` are 10 for a metre of decay and 200 for a
 # metre within a zone, each for 0.1 s: the robot enters a zone where waiting would cost more.
+
+# %% [markdown]
+# **Two prices of one thing.** The search pays for each *second* in a zone, the plan for each *metre* of depth. Somebody stands in the
+# middle of a corridor, and their zone reaches to the walls. The search finds a way along the wall: it is in the zone for
+# some 2 s, which costs 4 s. The plan would pay for its depth in each step, and would wait in front of the zone. Somebody who
+# stands does not go away, so it would wait for ever. So the zone of a person who *stands* is, in the plan, no larger than the
+# way leaves it. Where the way has no room for the robot and 0.2 m to the body, the zone stays whole, and the robot waits.
 #
+# **What do you think?** The robot is 1 m wide, a body 0.5 m. In which of these corridors does it pass? How near?
+
+# %%
+passed = {}
+for width in (2.8, 3.4, 4.0):
+    y = width / 2
+    corridor = [[(9, y), (-2, y), (-2, -y), (9, -y)]]  # closed behind the robot
+    person = szlib.Person((4, 0))
+    scene = szlib.Scenario("corridor", (0, 0, 0, 0), (8, 0), (person,), corridor, duration=20.0)
+    log = szlib.simulate(scene, szlib.MPCCBF(zone, walls=corridor, settings=among))
+    passed[width] = log.success, log.metrics()["min_clearance_people"]
+    does = "passes" if log.success else "waits"
+    print(f"{width} m wide: {does}, at least {passed[width][1]:.2f} m from the body")
+
+# %% [markdown]
+# <details><summary>Answer</summary>
+#
+# At 2.8 m the disc and its margin would leave 0.1 m to the body: it waits. In the other two it passes as far off as the
+# walls allow, and each of these steps says that it is not safe, because it is in the zone.
+#
+# </details>
+
+# %% jupyter={"source_hidden": true}
+# Checks
+arrives, gaps = zip(*passed.values(), strict=True)
+what = "in the wider two corridors the robot passes the person, and in the narrow one it waits"
+record.check(what, arrives == (False, True, True), f"at least {min(gaps):.2f} m from the body")
+record.check("it keeps 0.2 m from the body", min(gaps) >= among.body_gap - 1e-3, f"{min(gaps):.2f} m")
+
+# %% [markdown]
 # **Why not a high price for walls?** Because prices are added up. Two people come along a wall. Say that 0.5 m into the
 # wall give each of them 0.3 m more. If a metre has one price, that saves $2 \cdot 0.3 = 0.6$ m and costs 0.5 m: the robot
 # drives into the wall. A price that is high enough for two

@@ -88,7 +88,7 @@ from .settings import TOLERANCE, MPCSettings, check_argument
 from .step import Scene, Status, Step
 from .verification import AT_REST
 from .walls import find_solids, read_walls
-from .ways import Heading, WayFinder, find_target
+from .ways import CELL, Heading, WayFinder, find_target
 
 _BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
 
@@ -355,7 +355,7 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        question = Question(state, heading.target, last, scene.barriers)
+        question = Question(state, heading.target, last, _ease_zones(scene, heading))
         guess = self._plan + self._change
         if s.solver == "ipopt":
             near = self._planner.keep_reachable(question, guess)
@@ -574,6 +574,26 @@ class MPCCBF(Controller):
             raise SolverError(
                 f"the run starts at {hypot(vx, vy):.3f} m/s; the limit is {self._s.v_max} m/s"
             )
+
+
+def _ease_zones(scene: Scene, heading: Heading) -> Obstacles:
+    """The barriers, where zones of people who stand are not much larger than the way leaves them.
+
+    A way through a zone has paid for it by the second (`szlib.control.ways`). To the plan each metre of depth
+    has a price, so without this it would stand before the zone for ever. Of a zone that the way cuts by less
+    than a cell the plan keeps out, and of that of a person whom there is no room to pass; with
+    `zone_price=inf` of all.
+    """
+    n = len(scene.people)
+    s = scene.settings
+    if not (n and heading.ways and s.zone_price < inf):
+        return scene.barriers
+    ((kind, numbers, offsets),) = scene.zones.groups
+    points = heading.ways[0].points[1:]
+    h = scene.find_standing_h(*points.T)[:n].min(axis=1)
+    is_open = scene.zones.gaps(*points.T).min(axis=1) >= s.body_gap
+    eased = Group(kind, numbers, offsets + is_open * np.minimum(h + CELL, 0.0))
+    return scene.zones._replace(groups=(eased,)).joined(scene.fixed)
 
 
 def _choose_zone(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:

@@ -24,7 +24,7 @@ from szlib.control import (
     walls_from_grid,
 )
 from szlib.control.controller import advance
-from szlib.control.obstacles import Group
+from szlib.control.obstacles import Group, PaperWall
 from szlib.control.people import find_places
 from szlib.control.ways import (
     CELL,
@@ -43,6 +43,7 @@ from szlib.control.ways import (
     find_target,
 )
 from szlib.core.checks import Array
+from szlib.zones.ellipses import BODY_RADIUS
 
 AHEAD = szlib.MPCSettings(lookahead=4.0, time_limit=np.inf)
 PLAIN = szlib.MPCSettings(time_limit=np.inf)
@@ -82,8 +83,7 @@ def shortest(start: Array, goal: Array, boxes: shapely.Geometry) -> float:
 def find_route(start: Any, goal: Any, walls: Any, clearance: float) -> Array:
     """A short way around `walls` on a map of cells, shape (m, 2); empty if there is none."""
     c, segments = max(clearance, 0.06), read_walls(walls)
-    lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
-    group = Group(Wall, segments.reshape(-1, 4), c + c**2 / lengths)
+    group = Group(Wall, segments.reshape(-1, 4), np.full(len(segments), c))
     found = Map(Obstacles((group,), c), np.array([start, goal]), c)
     found.measure(start, goal, 1.0, np.zeros(found.shape))
     if not found.is_reached:
@@ -139,12 +139,13 @@ def test_routes_are_free_of_walls_and_nearly_as_short_as_they_can_be() -> None:
 
 
 @pytest.mark.parametrize("size", [0.05, 0.4, 1.0, 2.0, 8.0])
-def test_the_box_of_a_wall_holds_all_places_so_near_and_little_more(size) -> None:
-    wall = Wall(0.0, 0.0, size, 0.0)
-    offset = 0.5 + wall.margin(AHEAD)
+@pytest.mark.parametrize("kind", [Wall, PaperWall])
+def test_the_box_of_a_wall_holds_all_places_so_near_and_little_more(kind, size) -> None:
+    wall = kind(0.0, 0.0, size, 0.0)
+    offset = 0.5 + (0.05 if kind is Wall else wall.margin(AHEAD))
     x, y = np.meshgrid(np.linspace(-3, size + 3, 1201), np.linspace(-3, 3, 1201))
-    inside = Wall.distance(x, y, 0.0, *wall.numbers) < offset
-    low, high = Wall.bounds(np.array([wall.numbers]), np.array([offset]))
+    inside = kind.distance(x, y, 0.0, *wall.numbers) < offset
+    low, high = kind.bounds(np.array([wall.numbers]), np.array([offset]))
     edge = max(high[0, 1], high[0, 0] - size)
     assert low[0] == pytest.approx([-edge, -edge])
     reach = max(x[inside].max() - size, y[inside].max())
@@ -835,6 +836,53 @@ def test_a_corridor_of_a_grid_that_is_not_along_it_is_passed(slope: float) -> No
     walls = walls_from_grid((across > 0.65) & (across < 0.9), 0.05, (-5, -5, 0))
     along = np.array([1, slope]) / np.hypot(1, slope)
     assert drive_alone(walls, -3.5 * along, 3.5 * along, 0.3, 30.0) < 20.0
+
+
+def test_a_bent_corridor_is_passed_alike_however_its_walls_are_cut() -> None:
+    times = list[float]()
+    for pieces in (7, 14, 35):
+        angles = np.linspace(0, np.pi / 2, pieces + 1)
+        bend = np.column_stack([np.cos(angles), np.sin(angles)])
+        walls = [(4.0 + side) * bend for side in (-0.65, 0.65)]
+        times.append(drive_alone(walls, (4.0, 0.05), (0.05, 4.0), 0.3, 30.0))
+    assert max(times) < 1.2 * min(times) < 12.0
+
+
+@pytest.mark.parametrize(("width", "r_robot"), [(2.6, 0.3), (3.4, 0.5), (3.6, 0.5)])
+def test_a_person_who_stands_in_a_corridor_is_passed_as_far_off_as_the_walls_leave(
+    width: float, r_robot: float
+) -> None:
+    """Their zone reaches to the walls, so that the way leads through it."""
+    settings = szlib.MPCSettings.among_people(time_limit=np.inf, r_robot=r_robot)
+    walls = [[(-8, y), (8, y)] for y in (width / 2, -width / 2)]
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
+    x, goal = np.array([-3.0, 0.0, 0.0, 0.0]), (3.0, 0.0)
+    gaps = list[float]()
+    while np.hypot(*(x[:2] - goal)) > 0.2 and len(gaps) < 150:
+        step = controller.step(x, goal, [szlib.Person((0.0, 0.0))])
+        assert step.walls_safe and step.passively_safe
+        x = advance(x, step.control, 0.1)
+        gaps.append(np.hypot(*x[:2]) - BODY_RADIUS - r_robot)
+    assert len(gaps) < 90
+    widest = width / 2 - settings.eps - 2 * r_robot - BODY_RADIUS
+    assert widest - 0.1 < min(gaps) < widest + 0.05
+
+
+@pytest.mark.parametrize(("width", "price"), [(2.0, 200.0), (3.0, np.inf)])
+def test_a_robot_waits_where_nobody_can_be_passed_or_no_zone_may_be_entered(
+    width: float, price: float
+) -> None:
+    settings = szlib.MPCSettings.among_people(
+        time_limit=np.inf, r_robot=0.3, zone_price=price
+    )
+    walls = [[(-8, -width / 2), (8, -width / 2), (8, width / 2), (-8, width / 2)]]
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
+    x = np.array([-3.0, 0.0, 0.0, 0.0])
+    for _ in range(120):
+        step = controller.step(x, (3.0, 0.0), [szlib.Person((0.0, 0.0))])
+        x = advance(x, step.control, 0.1)
+        assert step.h[0] > -0.01
+    assert np.hypot(*x[2:]) < 0.02 and step.stuck > 0
 
 
 def test_ways_know_a_prediction_beyond_the_horizon() -> None:
