@@ -240,7 +240,7 @@ for length, found in walls.items():
 # ## The controller with enough margin
 #
 # `MPCSettings.paper()` keeps the paper's eps around every wall (`margin="paper"`). `MPCSettings()` keeps around each
-# wall what it requires, $\max(\epsilon, r^2/L)$ (`margin="euclidean"`). Both are sent to a goal 40 cm ahead of the end
+# wall what it requires, $\max(\epsilon, r^2/L)$ (`margin="required"`). Both are sent to a goal 40 cm ahead of the end
 # of a wall of 1 m. The disc of the robot has a radius of 50 cm, so at this goal it overlaps the wall by 10 cm.
 #
 # *What will each of them do?*
@@ -313,9 +313,46 @@ record.check(
 record.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * gap
 
 # %% [markdown]
+# ## The true distance itself
+#
+# The required margin costs space beside short walls. `MPCSettings.among_people()` measures walls by their true distance
+# (`margin="euclidean"`): then eps is enough everywhere. Why does `MPCSettings()` not do the same?
+#
+# **What do you think?** In the paper's scenario *waiting* the robot goes around the corner of a wall into a pathway.
+# Three robots have the distance of the table, and barriers on $N_h$ steps of their plan. Which of them arrive?
+
+# %%
+robots = {
+    "paper's distance, required margin, N_h = 2": {},
+    "true distance, N_h = 2": {"margin": "euclidean"},
+    "true distance, N_h = 3": {"margin": "euclidean", "N_h": 3},
+}
+waiting, times = szlib.SCENARIOS["waiting"], {}
+for name, changes in robots.items():
+    robot = szlib.MPCCBF(zone, walls=waiting.walls, settings=szlib.MPCSettings(**changes))
+    times[name] = szlib.simulate(waiting, robot).metrics()["time_to_goal"]
+pd.Series(times, name="time to the goal [s]").round(1).to_frame()
+
+# %% [markdown]
+# <details><summary>Answer</summary>
+#
+# With the true distance and $N_h = 2$ the robot stands still before the wall, beside the corner (NaN: it does not arrive). Only
+# two steps of its plan obey the barriers. From the third step on the plan drives through the wall, so it gains nothing
+# by going aside first. With a third step it arrives. `among_people()` has barriers on its whole plan, of 3 s.
+#
+# </details>
+
+# %% jupyter={"source_hidden": true}
+# Checks
+found = ", ".join(f"{time:.1f} s" for time in times.values())
+arrives = [time < np.inf for time in times.values()]
+what = "with the true distance and two steps the robot does not pass the corner; with a third step it does"
+record.check(what, arrives == [True, False, True], found)
+
+# %% [markdown]
 # ## An obstacle of your own
 #
-# A round table in the way is no wall. Twelve short walls around it would need a large margin each. But its distance is known:
+# A round table in the way is no wall. Twelve short walls around it would be a rough outline. But its distance is known:
 # that to its centre, less its radius, which is Euclidean and needs no margin. An obstacle is one class with this distance. The
 # controller, its steps and their checks know nothing else of it.
 
@@ -347,8 +384,8 @@ record.check(
 Markdown(f"""**What we know now.** Around people the approximation errs to the safe side: no margin is needed, and beside
 the learned zone the robot keeps {100 * beside:.0f} cm more than it has to. At the ends of walls shorter than
 {r**2 / eps:g} m the paper's margin is too small, and our restricted pathway has such walls. The right margin is
-$r^2/L$, and the controller keeps it. It costs at most 0.42 r = {42 * r:.0f} cm of space, beside walls as long as the
-robot is wide: describe a row of short pieces as one long wall.""")
+$r^2/L$, and `MPCSettings()` keeps it. It costs at most 0.42 r = {42 * r:.0f} cm of space, beside walls as long as the
+robot is wide. `among_people()` keeps the true distance, which costs nothing: its plan obeys the barriers on each step.""")
 
 # %% jupyter={"source_hidden": true}
 # Summary of the checks

@@ -14,9 +14,9 @@ line. Its trimming term is r cos phi + r^2/L, so d^2 = r^2 + 2 (r^3/L) cos phi +
 greatest straight ahead of the end: d = r + r^2/L. A point beside the wall, u <= L/2 from the end, has
 the term (r^2 - u (L-u))/L at most, and is exact where that is negative.
 
-So the controller gives each wall the margin it requires (`Wall.margin`). This costs at most 0.42 r of space,
+So `MPCSettings()` gives each wall the margin it requires (`Wall.margin`). This costs at most 0.42 r of space,
 beside a wall of L = 2 r. Around a pillar, L -> 0, {d < r + r^2/L} becomes the disc of radius r, and it costs
-nothing.
+nothing. `MPCSettings.among_people()` keeps eps in Euclidean distance.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array
     """
     xy = check_array("points", points, (..., 2))
     ends = check_wall([np.asarray(a), np.asarray(b)])
-    return np.asarray(Wall.gap(xy[..., 0], xy[..., 1], 0.0, *ends.ravel()))
+    return np.asarray(Wall.distance(xy[..., 0], xy[..., 1], 0.0, *ends.ravel()))
 
 
 def required_margin(of: Ellipse | ArrayLike, r_robot: float) -> float:

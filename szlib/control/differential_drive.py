@@ -281,7 +281,8 @@ class DifferentialDrive(MPCCBF):
         radius = s.r_robot + (s.eps + self.ahead + self.chord_error)
         self.goal_clearance = radius + self.ahead
         self._wheels = _Wheels(self.ahead, self.v_max)
-        return replace(s, r_robot=radius, eps=0.0, v_max=self.v_max, margin="euclidean")
+        margin = "required" if s.margin == "paper" else s.margin
+        return replace(s, r_robot=radius, eps=0.0, v_max=self.v_max, margin=margin)
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""

@@ -2,7 +2,8 @@
 
 An obstacle is one class: the distance of a point, and the priority with which the robot keeps out.
 
-    segment     g = [(x-xa)(yb-ya) - (y-ya)(xb-xa)] / L,   t = [(L/2)^2 - |x-xc|^2] / L
+    segment     d = sqrt(g^2 + b^2): g across its line, b beyond its ends   (Euclidean)
+                g = [(x-xa)(yb-ya) - (y-ya)(xb-xa)] / L,   t = [(L/2)^2 - |x-xc|^2] / L
                 d = sqrt(g^2 + ((|t| - t)/2)^2)                            (paper, eq. 3-5)
     ellipse     d = (|x-ca| + |x-cb|)/2 - a,  ca and cb the foci          (paper, eq. 7)
     barrier     h = d - r_robot - margin, safe where h >= 0                (paper, sec. 4)
@@ -264,11 +265,6 @@ class Obstacle:
         """
         return cls.distance(x, y, t, *numbers)
 
-    @staticmethod
-    def _travel(distance: Any, *numbers: Any) -> Any:
-        """How far a robot at this `distance` must move at least to reach the obstacle [m]."""
-        return distance
-
     @classmethod
     def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
         """Boxes that hold all places nearer to obstacles than `offsets`: corners, shape (n, 2) each [m].
@@ -286,6 +282,10 @@ class Obstacle:
     def margin(self, settings: MPCSettings) -> float:
         """Margin that the robot keeps by its `settings` [m]: eps."""
         return settings.eps
+
+    def choose_kind(self, settings: MPCSettings) -> type[Obstacle]:
+        """The class that measures this obstacle by these `settings`: its own."""
+        return type(self)
 
     @classmethod
     def speeds(cls, numbers: Array) -> Array:
@@ -391,7 +391,43 @@ class Body(Obstacle):
 
 
 class Wall(Obstacle):
-    """A wall: a segment, whose `numbers` are its ends (xa, ya, xb, yb) [m] (paper, eq. 3-5)."""
+    """A wall: a segment, whose `numbers` are its ends (xa, ya, xb, yb) [m].
+
+    Its distance is Euclidean with `margin="euclidean"` of the settings; else it is a `PaperWall`.
+    """
+
+    kind = "wall"
+
+    def choose_kind(self, settings: MPCSettings) -> type[Obstacle]:
+        """The class that measures the distance as `MPCSettings.margin` of the `settings` says."""
+        return Wall if settings.margin == "euclidean" else PaperWall
+
+    def margin(self, settings: MPCSettings) -> float:
+        """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""
+        xa, ya, xb, yb = self.numbers
+        is_more = settings.margin == "required"
+        needed = settings.r_robot**2 / hypot(xb - xa, yb - ya) if is_more else 0.0
+        return max(settings.eps, needed)
+
+    @classmethod
+    def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
+        """See `Obstacle.bounds`; `numbers` and `offsets` as there."""
+        ends = numbers.reshape(-1, 2, 2)
+        reach = offsets[:, None]
+        return ends.min(axis=1) - reach, ends.max(axis=1) + reach
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        """See `Obstacle.distance`: Euclidean."""
+        return euclidean_segment_formula(x, y, *numbers)
+
+
+class PaperWall(Wall):
+    """A `Wall` whose distance is that of the paper: it is no less than the Euclidean one (eq. 3-5).
+
+    Beyond an end of a wall of length L it is s + s^2/L, with s how far a robot must move to the wall. So it
+    changes by more than the robot moves, and without a margin of r_robot^2 / L the robot may overlap the end.
+    """
 
     kind = "wall"
 
@@ -402,33 +438,21 @@ class Wall(Obstacle):
         A wall of length L is nearer than rho within sqrt(L^2/4 + L rho) of its middle, along the wall, and
         within sqrt(l rho - l^2/4) across, with l = min(L, 2 rho): no farther than rho and sqrt(L rho).
         """
-        ends = numbers.reshape(-1, 2, 2)
-        length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-        reach = np.minimum(offsets, np.sqrt(length * offsets))[:, None]
-        return ends.min(axis=1) - reach, ends.max(axis=1) + reach
+        length, _, _ = _project(0.0, 0.0, *numbers.T)
+        return super().bounds(numbers, np.minimum(offsets, np.sqrt(length * offsets)))
 
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """See `Obstacle.distance`: approximate beyond the ends."""
         return segment_formula(x, y, *numbers)
 
-    @staticmethod
-    def _travel(distance: Any, *numbers: Any) -> Any:
-        """The s of d = s + s^2/L: it changes by no more than the robot moves (`differential_drive`)."""
-        length, _, _ = _project(0.0, 0.0, *numbers)
-        return length / 2 * ((1 + 4 * distance / length) ** 0.5 - 1)
-
     @classmethod
     def gap(cls, x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """Euclidean distance to the segment; parameters as of `Obstacle.distance`."""
         return euclidean_segment_formula(x, y, *numbers)
 
-    def margin(self, settings: MPCSettings) -> float:
-        """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""
-        xa, ya, xb, yb = self.numbers
-        is_euclidean = settings.margin == "euclidean"
-        needed = settings.r_robot**2 / hypot(xb - xa, yb - ya) if is_euclidean else 0.0
-        return max(settings.eps, needed)
+
+_KINDS[Wall.kind] = Wall  # in a file, a wall is one however it is measured
 
 
 class HalfPlane(Obstacle):
@@ -545,7 +569,7 @@ class Obstacles(NamedTuple):
         """The obstacles `items` of a robot with these `settings`."""
         groups = list[Group]()
         for (kind, _), of_kind in groupby(
-            items, lambda each: (type(each), len(each.numbers))
+            items, lambda each: (each.choose_kind(settings), len(each.numbers))
         ):
             chosen = list(of_kind)
             numbers = np.array([each.numbers for each in chosen], float)
@@ -653,14 +677,14 @@ class Obstacles(NamedTuple):
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
         return Bound(lower.min(), gaps[:, _PARTS::_PARTS].min())
 
-    def find_travel(self, x: Array, y: Array, t: Any, body_gap: float) -> Array:
+    def find_travel(self, x: Array, y: Array, t: Any, s: MPCSettings) -> Array:
         """How far a robot must move at least until it violates a floor of each obstacle, shape (n, k) [m].
 
-        That is until h = 0, or until it is `body_gap` from the body of a person. An obstacle with the
+        That is until h = 0, or until the gap to a body is `body_gap`, or to a wall eps. An obstacle with the
         velocity w can be left out of a step of dt that begins where this is at least 2 (v + w) dt/gamma: then
         its rows hold whatever a robot does that is no faster than v. This is clear where h changes by no more
-        than the robot moves. For a wall of length L, d = F(s) = s + s^2/L, where s is how far the robot must
-        move to the wall. With S the same where h = 0,
+        than the robot moves. For a `PaperWall` of length L, d = F(s) = s + s^2/L, where s is at most the gap
+        to the wall. With S the same where h = 0, which is no more than r_robot + eps,
 
             gamma h(x_k) = gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
                          >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
@@ -671,17 +695,15 @@ class Obstacles(NamedTuple):
         ----------
         x, y : positions, shape (k,) [m].
         t : their times from now, shape (k,) [s].
-        body_gap : gap that the robot keeps to bodies [m].
+        s : settings of the robot.
         """
         found = [np.empty((0, len(x)))]
         for kind, numbers, offsets in self.groups:
             table = numbers.T[..., None]
-            own = kind._travel(kind.distance(x, y, t, *table), *table)
-            own = own - kind._travel(offsets, *numbers.T)[:, None]
-            if kind.priority > Priority.BODY:
-                gaps = kind.gap(x, y, t, *table) - self.r_robot
-                own = np.minimum(own, gaps - body_gap)
-            found.append(own)
+            far = kind.distance(x, y, t, *table) - offsets[:, None]
+            least = s.eps if kind.priority == Priority.WALL else s.body_gap
+            gaps = kind.gap(x, y, t, *table) - (s.r_robot + least)
+            found.append(np.minimum(far, gaps))
         return np.concatenate(found)
 
     def _collect(

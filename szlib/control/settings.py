@@ -15,7 +15,7 @@ from ..core.errors import SolverError
 # Raises SolverError: "`name` must be `expected`; got `value`".
 check_argument = partial(require, error=SolverError)
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
-Margin = Literal["euclidean", "paper"]
+Margin = Literal["required", "euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest"]
@@ -81,9 +81,9 @@ class MPCSettings:
         On a large map a new goal takes some 0.1 s, at most some 0.5 s; 1 s if r_robot + eps is nearly 0.
         Towards a goal that is some 500 m away the map is coarse, and doors are closed: give a nearer one.
     eps : margin for the error of the approximate distances [m].
-    margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
-        least eps (see `Wall.margin`). "paper": eps, which allows overlaps with the ends of walls shorter
-        than r_robot^2 / eps.
+    margin : around walls. "euclidean": eps, in Euclidean distance. By the paper's distance (eq. 3-5), which
+        is greater beyond the ends: "paper": eps, which allows overlaps with the ends of walls shorter
+        than r_robot^2 / eps; "required": r_robot^2 / L around a wall of length L, and at least eps.
     zone_speed : walking speed whose social zone is used, if a zone depends on speed [m/s].
     pass_side : the side on which the robot prefers to pass a person whom it meets head-on: "right" or "left".
     head_on_share : a meeting is head-on while the goal lies within this share of the half-angle under which
@@ -93,6 +93,7 @@ class MPCSettings:
         in `szlib.control.mpc`.
     decay_price, zone_price : prices of a metre, and 0.1 s, of decay of h beyond gamma, and of h < 0 of a zone
         [cost per metre to the goal]. `inf`, as in the paper: violated only where no plan satisfies the row.
+        With a finite zone_price a way may lead through the zones of people who stand, if it is the cheapest.
     body_gap : gap to the bodies of people that has priority over zones and decay [m].
     guard : True: the robot brakes in a step whose plan might end in a wall or a body; see
         `szlib.control.mpc`. False, as in the paper.
@@ -133,7 +134,7 @@ class MPCSettings:
     lookahead: float = inf
     r_robot: float = 0.5
     eps: float = 0.05
-    margin: Margin = "euclidean"
+    margin: Margin = "required"
     zone_speed: float = 1.1
     pass_side: Side = "right"
     head_on_share: float = 0.25
@@ -223,7 +224,8 @@ class MPCSettings:
         It plans 30 `dt` ahead, 3 s, in 14 steps with barriers on each, takes a way around walls and between
         people, to a point at most 1 m farther than it can come, and prefers a smooth ride. A decay of h
         beyond gamma has a price, and a zone a high one, so that the robot passes where people leave it no
-        other way: see `Step.safe` and `Step.explain`. Notebook 12 compares it with the paper's controller.
+        other way: see `Step.safe` and `Step.explain`. Distances to walls are Euclidean. Notebook 12 compares
+        it with the paper's controller.
 
         Examples
         --------
@@ -239,6 +241,7 @@ class MPCSettings:
             "decay_price": 10.0,
             "zone_price": 200.0,
             "body_gap": 0.2,
+            "margin": "euclidean",
             "max_iterations": 8,
         }
         counts = {"N", "N_h"} & changes.keys()

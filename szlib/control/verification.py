@@ -280,7 +280,8 @@ def _measure(
                 heading = person.heading or 0.0
                 measured = _measure_zone(offset, heading, zone) - growth
         elif isinstance(each, Wall):
-            measured = _measure_wall(points, each, is_barrier)
+            is_paper = is_barrier and s.margin != "euclidean"
+            measured = _measure_wall(points, each, is_paper)
         else:
             measure = each.distance if is_barrier else each.gap
             measured = measure(*points.T, times, *each.numbers)
@@ -312,15 +313,15 @@ def _measure_zone(offset: Array, heading: float, zone: Ellipse) -> Array:
     return np.asarray((np.abs(seen - focus) + np.abs(seen + focus)) / 2 - a)
 
 
-def _measure_wall(points: Array, wall: Wall, is_barrier: bool) -> Array:
-    """Approximate distance to a wall (paper, eq. 3-5), or the Euclidean one."""
+def _measure_wall(points: Array, wall: Wall, is_paper: bool) -> Array:
+    """Euclidean distance to a wall, or the approximate one (paper, eq. 3-5)."""
     xa, ya, xb, yb = wall.numbers
     start = complex(xa, ya)
     along = complex(xb - xa, yb - ya)
     length = abs(along)
     # complex numbers: along the wall from its middle, and across
     seen = (points @ (1, 1j) - start) / (along / length) - length / 2
-    if is_barrier:
+    if is_paper:
         beyond = np.maximum((np.abs(seen) ** 2 - length**2 / 4) / length, 0.0)
     else:
         beyond = np.maximum(np.abs(seen.real) - length / 2, 0.0)

@@ -142,7 +142,8 @@ def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
     rng, near = np.random.default_rng(3), 0
     for _ in range(50):
         s = szlib.MPCSettings(
-            eps=rng.choice([0.0, 0.05]), margin=rng.choice(["euclidean", "paper"])
+            eps=rng.choice([0.0, 0.05]),
+            margin=rng.choice(["required", "euclidean", "paper"]),
         )
         wall = rng.uniform(-2, 2, 2) + np.outer(
             [-1, 1], rng.uniform(-1, 1, 2)

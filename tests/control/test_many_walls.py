@@ -164,7 +164,7 @@ def test_an_obstacle_that_comes_fast_is_met_though_many_others_are_near(n: int) 
 def test_ipopt_gets_of_many_walls_those_that_it_may_come_near() -> None:
     """Its plan is that of the other solver among all walls."""
     walls = scattered(200)
-    paper = szlib.MPCSettings.paper(margin="euclidean", guard=False)
+    paper = szlib.MPCSettings.paper(margin="required", guard=False)
     controller = szlib.MPCCBF(ZONE, walls=walls, settings=paper)
     state, target = np.array([0.0, 0.0, 0.3, 0.1]), GOAL
     barriers = controller._fixed
@@ -215,7 +215,7 @@ def test_a_plan_that_is_cut_short_before_all_its_obstacles_are_known_is_not_opti
         assert step.timed_out and (step.feasible or step.status != "optimal")
 
 
-@pytest.mark.parametrize("seed", (1, 2, 4, 5))
+@pytest.mark.parametrize("seed", (1, 2, 5, 6))
 def test_a_plan_that_leaves_its_guess_meets_the_walls_that_it_did_not_know(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -255,11 +255,7 @@ def test_no_move_makes_an_obstacle_out_of_reach_matter() -> None:
         half = each.numbers[2] if isinstance(each, Wall) else 1.0
         points = rng.uniform(-12 - half, 12 + half, (3000, 2)).tolist()
         out = np.array(
-            [
-                p
-                for p in points
-                if table.find_travel(*np.transpose([p]), 0.0, 0.0) > reach
-            ]
+            [p for p in points if table.find_travel(*np.transpose([p]), 0.0, S) > reach]
         )
         assert len(out) > 100
         edge = out[np.argsort(np.abs(np.hypot(*out.T) - reach))][:500]

@@ -21,6 +21,7 @@ from szlib.control import HalfPlane, Obstacle, Obstacles, Wall, Zone
 from szlib.control.controller import advance, find_stopping_path
 from szlib.control.obstacles import (
     Body,
+    PaperWall,
     Path,
     Priority,
     barrier,
@@ -28,6 +29,7 @@ from szlib.control.obstacles import (
     describe,
     ellipse_formula,
     number_kinds,
+    rebuild,
     restore,
     segment_formula,
 )
@@ -37,6 +39,7 @@ coordinate = st.floats(-5, 5)
 point = st.tuples(coordinate, coordinate)
 ZONE = szlib.Ellipse((0.3, -0.2), (1.0, 0.7), 0.4)
 S = szlib.MPCSettings(time_limit=np.inf)
+EUCLIDEAN = szlib.MPCSettings(time_limit=np.inf, margin="euclidean")
 
 
 def identify(obstacles):
@@ -193,27 +196,29 @@ def some_of_each(rng: np.random.Generator) -> list[Obstacle]:
         *zones,
         *(Body(*p, *v) for p, v in zip(places, velocities, strict=True)),
         *(Wall(*ends) for ends in rng.uniform(-3, 3, (3, 4)).tolist()),
+        PaperWall(*rng.uniform(-3, 3, 4).tolist()),
         HalfPlane(rng.uniform(-3, 3, 2), rng.normal(size=2)),
         Table(*rng.uniform(-3, 3, 2).tolist(), 0.6),
     ]
 
 
-def test_h_of_a_table_of_obstacles_is_that_of_each_obstacle():
+@pytest.mark.parametrize("s", [S, EUCLIDEAN], ids=["required", "euclidean"])
+def test_h_of_a_table_of_obstacles_is_that_of_each_obstacle(s):
     rng = np.random.default_rng(3)
-    items = some_of_each(rng)
-    table, (x, y) = Obstacles.of(items, S), rng.uniform(-4, 4, (2, 5, 6))
+    items = [rebuild(each.choose_kind(s), each.numbers) for each in some_of_each(rng)]
+    table, (x, y) = Obstacles.of(items, s), rng.uniform(-4, 4, (2, 5, 6))
     t = rng.uniform(0, 2, (5, 6))
     assert identify(table.items) == identify(items) and table.size == len(items)
     h, gaps = table.h(x, y, t), table.gaps(x, y, t)
     assert h.shape == gaps.shape == (len(items), 5, 6)
     for each, own_h, own_gap in zip(items, h, gaps, strict=True):
-        offset = S.r_robot + each.margin(S)
+        offset = s.r_robot + each.margin(s)
         assert own_h == pytest.approx(each.distance(x, y, t, *each.numbers) - offset)
-        assert own_gap == pytest.approx(each.gap(x, y, t, *each.numbers) - S.r_robot)
+        assert own_gap == pytest.approx(each.gap(x, y, t, *each.numbers) - s.r_robot)
     assert table.h(0.3, 0.4).shape == (len(items),)
-    assert Obstacles((), S.r_robot).h(x, y, t).shape == (0, 5, 6)
-    walls = Obstacles.of(items[4:7], S)
-    both = Obstacles.of(items[:2], S).joined(walls)
+    assert Obstacles((), s.r_robot).h(x, y, t).shape == (0, 5, 6)
+    walls = Obstacles.of(items[4:7], s)
+    both = Obstacles.of(items[:2], s).joined(walls)
     assert identify(both.items) == identify([*items[:2], *items[4:7]])
 
 
@@ -245,14 +250,29 @@ def test_no_distance_changes_by_more_than_the_robot_and_the_obstacle_move():
 
 
 @pytest.mark.parametrize("length", [1e-3, 0.1, 1.0, 10.0, 100.0])
-def test_the_travel_to_a_wall_changes_by_no_more_than_the_robot_moves(length):
+def test_the_distance_of_the_paper_is_between_the_true_one_and_that_ahead_of_an_end(
+    length,
+):
+    """s <= d <= s + s^2/L, and s = F^-1(d) changes by no more than the robot moves."""
     rng, ends = np.random.default_rng(6), (-length / 2, 0.0, length / 2, 0.0)
     p = rng.normal(size=(20000, 2)) * (length + np.geomspace(1e-3, 50, 20000))[:, None]
     q = p + rng.normal(0, 0.2, p.shape)
-    d = [Wall.distance(*each.T, 0.0, *ends) for each in (p, q)]
-    s = [Wall._travel(each, *ends) for each in d]
+    d = [PaperWall.distance(*each.T, 0.0, *ends) for each in (p, q)]
+    true = Wall.distance(*p.T, 0.0, *ends)
+    assert (true <= d[0] + 1e-9).all()
+    assert (d[0] <= (true + true**2 / length) * (1 + 1e-9) + 1e-9).all()
+    s = [length / 2 * (np.sqrt(1 + 4 * each / length) - 1) for each in d]
     assert (np.abs(s[1] - s[0]) <= np.hypot(*(q - p).T) + 1e-9).all()
-    assert (s[0] <= Wall.gap(*p.T, 0.0, *ends) + 1e-9).all()
+
+
+def test_a_wall_is_measured_as_the_settings_say():
+    wall, ahead = Wall(-1.0, 0.0, 0.0, 0.0), (1.0, 0.0)
+    expected = {"euclidean": 1.0 - 0.55, "paper": 2.0 - 0.55, "required": 2.0 - 0.75}
+    for margin, h in expected.items():
+        settings = szlib.MPCSettings(margin=margin)
+        assert Obstacles.of([wall], settings).h(*ahead) == pytest.approx(h)
+        assert Obstacles.of([wall], settings).gaps(*ahead) == pytest.approx(0.5)
+    assert type(restore(describe(PaperWall(*wall.numbers)))) is Wall
 
 
 def test_a_zone_in_the_world_is_the_zone_placed_at_its_person():
@@ -271,7 +291,7 @@ def test_a_zone_in_the_world_is_the_zone_placed_at_its_person():
 def test_the_margin_of_a_wall_is_what_it_requires_and_never_less_than_eps(length):
     wall, paper = Wall(0.0, 0.0, length, 0.0), szlib.MPCSettings(margin="paper")
     assert wall.margin(S) == max(0.05, 0.25 / length)
-    assert wall.margin(paper) == 0.05
+    assert wall.margin(paper) == wall.margin(EUCLIDEAN) == 0.05
     table = Obstacles.of([wall], S)
     for touching in ((length + 0.5, 0.0), (-0.3, 0.4), (length + 0.3, -0.4)):
         assert table.h(*touching)[0] <= 1e-9
@@ -495,7 +515,8 @@ def test_something_that_is_no_obstacle_is_refused():
 
 
 def test_an_obstacle_is_restored_from_its_kind_and_numbers():
-    for each in some_of_each(np.random.default_rng(10)):
+    items = some_of_each(np.random.default_rng(10))
+    for each in [each for each in items if type(each) is not PaperWall]:
         assert identify([restore(describe(each))]) == identify([each])
     with pytest.raises(
         szlib.SolverError, match=r"kind of an obstacle must be that of a class.*'sofa'"

@@ -93,9 +93,13 @@ class Judge:
     walls: list[Any]
     people: list[szlib.Person]
 
+    def to_wall(self, p: Any, wall: Any) -> float:
+        is_true = self.s.margin == "euclidean"
+        return to_segment(p, wall) if is_true else paper_to_segment(p, wall)
+
     def margin(self, wall: Any) -> float:
         needed = self.s.r_robot**2 / np.linalg.norm(wall[1] - wall[0])
-        return max(self.s.eps, needed if self.s.margin == "euclidean" else 0.0)
+        return max(self.s.eps, needed if self.s.margin == "required" else 0.0)
 
     def h(self, p: Any, seconds: float = 0.0) -> Any:
         found = []
@@ -107,7 +111,7 @@ class Judge:
                 - self.s.eps
             )
         found += [
-            paper_to_segment(p, wall) - self.s.r_robot - self.margin(wall)
+            self.to_wall(p, wall) - self.s.r_robot - self.margin(wall)
             for wall in self.walls
         ]
         return np.array(found)
@@ -261,7 +265,7 @@ def settings_of(rng: np.random.Generator, solver: str = "sqp") -> szlib.MPCSetti
         v_max=rng.uniform(0.2, 3),
         r_robot=rng.choice([0.0, rng.uniform(0.05, 0.8)]),
         eps=rng.choice([0.0, 0.05, rng.uniform(0, 0.3)]),
-        margin=rng.choice(["euclidean", "euclidean", "paper"]),
+        margin=rng.choice(["required", "euclidean", "paper"]),
         head_on_share=rng.choice([0.0, 0.25, 0.5]),
         pass_side=rng.choice(["left", "right"]),
         terminal=rng.choice(["none", "none", "rest"]),

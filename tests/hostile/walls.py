@@ -47,6 +47,7 @@ SETTINGS: dict[str, tuple[Any, dict[str, Any], bool]] = {
     "default, body_gap 0.3": (Settings, {"body_gap": 0.3}, False),
     "default, eps 0": (Settings, {"eps": 0.0}, False),
     "default, margin paper": (Settings, {"margin": "paper"}, False),
+    "default, margin euclidean": (Settings, {"margin": "euclidean"}, False),
     "default, gamma 1": (Settings, {"gamma": 1.0}, False),
     "default, a_max 0.2": (Settings, {"a_max": 0.2}, False),
     "default, dt 0.05": (Settings, {"dt": 0.05}, False),

@@ -157,7 +157,7 @@ def test_the_euclidean_margin_and_the_guard_each_avoid_short_walls():
             n_jobs=1,
             progress=False,
         )
-        for margin, guard in (("euclidean", False), ("paper", True), ("paper", False))
+        for margin, guard in (("required", False), ("paper", True), ("paper", False))
     )
     assert careful["min_clearance_walls"].min() >= -1e-6
     assert guarded["min_clearance_walls"].min() >= -1e-6
