@@ -580,9 +580,9 @@ def _ease_zones(scene: Scene, heading: Heading) -> Obstacles:
     """The barriers, where zones of people who stand are not much larger than the way leaves them.
 
     A way through a zone has paid for it by the second (`szlib.control.ways`). To the plan each metre of depth
-    has a price, so without this it would stand before the zone for ever. Of a zone that the way cuts by less
-    than a cell the plan keeps out, and of that of a person whom there is no room to pass; with
-    `zone_price=inf` of all.
+    has a price, so without this it would stand before the zone for ever. The plan keeps out of a zone that
+    the way cuts by less than a cell, that holds the end of the way, or whose person there is no room to pass;
+    with `zone_price=inf` of all.
     """
     n = len(scene.people)
     s = scene.settings
@@ -590,9 +590,11 @@ def _ease_zones(scene: Scene, heading: Heading) -> Obstacles:
         return scene.barriers
     ((kind, numbers, offsets),) = scene.zones.groups
     points = heading.ways[0].points[1:]
-    h = scene.find_standing_h(*points.T)[:n].min(axis=1)
-    is_open = scene.zones.gaps(*points.T).min(axis=1) >= s.body_gap
-    eased = Group(kind, numbers, offsets + is_open * np.minimum(h + CELL, 0.0))
+    h = scene.find_standing_h(*points.T)[:n]
+    gaps = scene.zones.gaps(*points.T).min(axis=1)
+    is_passed = (gaps >= s.body_gap) & (h[:, -1] >= 0)
+    depths = is_passed * np.minimum(h.min(axis=1) + CELL, 0.0)
+    eased = Group(kind, numbers, offsets + depths)
     return scene.zones._replace(groups=(eased,)).joined(scene.fixed)
 
 

@@ -885,6 +885,16 @@ def test_a_robot_waits_where_nobody_can_be_passed_or_no_zone_may_be_entered(
     assert np.hypot(*x[2:]) < 0.02 and step.stuck > 0
 
 
+def test_a_goal_in_the_zone_of_a_person_who_stands_is_waited_for() -> None:
+    controller, person = szlib.MPCCBF(ZONE, settings=AMONG), szlib.Person((3.0, 0.0))
+    x, goal = np.zeros(4), (2.0, 0.3)
+    for _ in range(80):
+        step = controller.step(x, goal, [person])
+        x = advance(x, step.control, 0.1)
+        assert step.h[0] > -0.01 and step.goal_blocked
+    assert np.hypot(*x[2:]) < 0.05
+
+
 def test_ways_know_a_prediction_beyond_the_horizon() -> None:
     """Somebody who is predicted to stop does not walk on."""
     times = np.arange(1.0, 11.0)

@@ -4,12 +4,14 @@ import importlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from studies import committed
 
 from szlib.workbook import folders
 from szlib.workbook.record import TABLES
+from szlib.workbook.record.notebook_record import find_differences, read_table
 
 FOLDER = Path(committed.__file__).parent
 for module in sorted(FOLDER.glob("[a-z]*.py")):
@@ -31,6 +33,32 @@ def test_a_table_is_made_by_its_module_and_shown_in_its_notebook(name):
     assert name in text or f"{study.module}.TABLE" in text or "coverage" in name
     if study.probe:
         assert study.probe.__name__ in text
+
+
+MODELS = "crowd in ('orca', 'social force')"
+OF_ROBOTS = {
+    "09_gamma": "",
+    "21_feasibility": "",
+    "21_rollouts": "",
+    "26_meetings": "",
+    "29_crossings": "",
+    "29_crowds": MODELS,
+    "29_differential": "",
+    "29_safety_claims": MODELS,
+    "29_walkers": "crowd == 'plaza'",
+}
+"""Tables of robots, and the rows that need no real data."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OF_ROBOTS)
+def test_rows_from_all_parts_of_a_table_of_robots_are_reproduced(name):
+    """A notebook computes one row again, and always the same one."""
+    rows = read_table(name).query(OF_ROBOTS[name] or "index >= 0")
+    chosen = rows.iloc[np.linspace(0, len(rows) - 1, 8).round()]
+    for _, row in chosen.drop_duplicates().iterrows():
+        again = committed.STUDIES[name].probe(row)
+        assert not find_differences(row, again), row.to_dict()
 
 
 def test_a_table_that_no_study_registered_is_not_written():
