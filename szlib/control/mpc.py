@@ -355,7 +355,7 @@ class MPCCBF(Controller):
         s = self._s
         state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        question = Question(state, heading.target, last, _ease_zones(scene, heading))
+        question = Question(state, heading.target, last, _shrink_zones(scene, heading))
         guess = self._plan + self._change
         if s.solver == "ipopt":
             near = self._planner.keep_reachable(question, guess)
@@ -576,7 +576,7 @@ class MPCCBF(Controller):
             )
 
 
-def _ease_zones(scene: Scene, heading: Heading) -> Obstacles:
+def _shrink_zones(scene: Scene, heading: Heading) -> Obstacles:
     """The barriers, where zones of people who stand are not much larger than the way leaves them.
 
     A way through a zone has paid for it by the second (`szlib.control.ways`). To the plan each metre of depth
@@ -594,8 +594,8 @@ def _ease_zones(scene: Scene, heading: Heading) -> Obstacles:
     gaps = scene.zones.gaps(*points.T).min(axis=1)
     is_passed = (gaps >= s.body_gap) & (h[:, -1] >= 0)
     depths = is_passed * np.minimum(h.min(axis=1) + CELL, 0.0)
-    eased = Group(kind, numbers, offsets + depths)
-    return scene.zones._replace(groups=(eased,)).joined(scene.fixed)
+    shrunk = Group(kind, numbers, offsets + depths)
+    return scene.zones._replace(groups=(shrunk,)).joined(scene.fixed)
 
 
 def _choose_zone(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
