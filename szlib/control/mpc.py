@@ -582,18 +582,19 @@ def _shrink_zones(scene: Scene, heading: Heading) -> Obstacles:
     A way through a zone has paid for it by the second (`szlib.control.ways`). To the plan each metre of depth
     has a price, so without this it would stand before the zone for ever. The plan keeps out of a zone that
     the way cuts by less than a cell, that holds the end of the way, or whose person there is no room to pass;
-    with `zone_price=inf` of all.
+    and without prices of zones and decay out of all.
     """
     n = len(scene.people)
     s = scene.settings
-    if not (n and heading.ways and s.zone_price < inf):
+    if not (n and heading.ways and max(s.zone_price, s.decay_price) < inf):
         return scene.barriers
     ((kind, numbers, offsets),) = scene.zones.groups
     points = heading.ways[0].points[1:]
     h = scene.find_standing_h(*points.T)[:n]
     gaps = scene.zones.gaps(*points.T).min(axis=1)
     is_passed = (gaps >= s.body_gap) & (h[:, -1] >= 0)
-    depths = is_passed * np.minimum(h.min(axis=1) + CELL, 0.0)
+    h = h.min(axis=1)
+    depths = np.where(is_passed & (h < -CELL), h + CELL / 3, 0.0)
     shrunk = Group(kind, numbers, offsets + depths)
     return scene.zones._replace(groups=(shrunk,)).joined(scene.fixed)
 

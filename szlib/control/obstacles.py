@@ -400,7 +400,8 @@ class Wall(Obstacle):
 
     def choose_kind(self, settings: MPCSettings) -> type[Obstacle]:
         """The class that measures the distance as `MPCSettings.margin` of the `settings` says."""
-        return Wall if settings.margin == "euclidean" else PaperWall
+        is_paper = settings.margin != "euclidean" and type(self) is Wall
+        return PaperWall if is_paper else type(self)
 
     def margin(self, settings: MPCSettings) -> float:
         """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""

@@ -357,9 +357,8 @@ class Step:
             f"h of {slowest} falls faster than gamma = {s.gamma:g}, at its price; what helps: a "
             f"decay_price above {s.decay_price:g}": s.decay_price < inf
             and worst[Priority.DECAY] > TOLERANCE,
-            f"it enters a zone by {worst[Priority.ZONE]:.2g} m, at its price or on its way; what helps: a "
-            "higher zone_price, or inf": s.zone_price < inf
-            and worst[Priority.ZONE] > TOLERANCE,
+            f"it enters a zone by {worst[Priority.ZONE]:.2g} m, at its price or on its way; what helps: "
+            "zone_price=inf": s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
             "v_max": not self.passively_safe,

@@ -18,7 +18,7 @@ import shapely
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .obstacles import Priority, Wall, Zone
+from .obstacles import PaperWall, Priority, Wall, Zone
 from .settings import TOLERANCE, MPCSettings
 
 # Two computations of one number may differ by this much, relative to the largest number (at least 1).
@@ -279,8 +279,8 @@ def _measure(
                 zone = scene.person_zones[i]
                 heading = person.heading or 0.0
                 measured = _measure_zone(offset, heading, zone) - growth
-        elif isinstance(each, Wall):
-            is_paper = is_barrier and s.margin != "euclidean"
+        elif type(each) in (Wall, PaperWall):
+            is_paper = is_barrier and isinstance(each, PaperWall)
             measured = _measure_wall(points, each, is_paper)
         else:
             measure = each.distance if is_barrier else each.gap

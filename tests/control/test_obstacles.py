@@ -39,6 +39,7 @@ coordinate = st.floats(-5, 5)
 point = st.tuples(coordinate, coordinate)
 ZONE = szlib.Ellipse((0.3, -0.2), (1.0, 0.7), 0.4)
 S = szlib.MPCSettings(time_limit=np.inf)
+AMONG = szlib.MPCSettings.among_people(time_limit=np.inf)
 EUCLIDEAN = szlib.MPCSettings(time_limit=np.inf, margin="euclidean")
 
 
@@ -273,6 +274,32 @@ def test_a_wall_is_measured_as_the_settings_say():
         assert Obstacles.of([wall], settings).h(*ahead) == pytest.approx(h)
         assert Obstacles.of([wall], settings).gaps(*ahead) == pytest.approx(0.5)
     assert type(restore(describe(PaperWall(*wall.numbers)))) is Wall
+
+
+class ThickWall(Wall):
+    """A wall of a user, 0.3 m thick on each side, around which the robot keeps 0.1 m."""
+
+    kind = "thick wall"
+
+    @staticmethod
+    def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
+        return Wall.distance(x, y, t, *numbers) - 0.3
+
+    gap = distance
+
+    def margin(self, settings: szlib.MPCSettings) -> float:
+        return 0.1
+
+
+@pytest.mark.parametrize("s", [S, AMONG], ids=["default", "among people"])
+def test_a_kind_of_wall_of_a_user_keeps_its_distance_and_margin(s):
+    wall = ThickWall(0.0, -5.0, 0.0, 5.0)
+    controller = szlib.MPCCBF(ZONE, obstacles=[wall], settings=s)
+    step = controller.step((-2.0, 0.0, 0.0, 0.0), (-1.0, 0.0))
+    assert identify(step.obstacles) == identify([wall])
+    assert step.h == pytest.approx([2.0 - 0.3 - 0.6])
+    assert step.clearance[0, 0] == pytest.approx(2.0 - 0.3 - 0.5)
+    assert step.verify().ok
 
 
 def test_a_zone_in_the_world_is_the_zone_placed_at_its_person():

@@ -868,13 +868,14 @@ def test_a_person_who_stands_in_a_corridor_is_passed_as_far_off_as_the_walls_lea
     assert widest - 0.1 < min(gaps) < widest + 0.05
 
 
-@pytest.mark.parametrize(("width", "price"), [(2.0, 200.0), (3.0, np.inf)])
+@pytest.mark.parametrize(
+    ("width", "prices"),
+    [(2.0, {}), (3.0, {"zone_price": np.inf}), (3.0, {"decay_price": np.inf})],
+)
 def test_a_robot_waits_where_nobody_can_be_passed_or_no_zone_may_be_entered(
-    width: float, price: float
+    width: float, prices: dict[str, float]
 ) -> None:
-    settings = szlib.MPCSettings.among_people(
-        time_limit=np.inf, r_robot=0.3, zone_price=price
-    )
+    settings = szlib.MPCSettings.among_people(time_limit=np.inf, r_robot=0.3, **prices)
     walls = [[(-8, -width / 2), (8, -width / 2), (8, width / 2), (-8, width / 2)]]
     controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
     x = np.array([-3.0, 0.0, 0.0, 0.0])
