@@ -464,8 +464,8 @@ display(movie)
 # **Two prices of one thing.** The search pays for each *second* in a zone, the plan for each *metre* of depth. Somebody stands in the
 # middle of a corridor, and their zone reaches to the walls. The search finds a way along the wall: it is in the zone for
 # some 2 s, which costs 4 s. The plan would pay for its depth in each step, and would wait in front of the zone. Somebody who
-# stands does not go away, so it would wait for ever. So the zone of a person who *stands* is, in the plan, no larger than the
-# way leaves it. Where the way has no room for the robot and 0.2 m to the body, the zone stays whole, and the robot waits.
+# stands does not go away, so it would wait for ever. So the plan shrinks the zone of a person who *stands* until the way is
+# nearly free. Where the way has no room for the robot and 0.2 m to the body, the zone stays whole, and the robot waits.
 #
 # **What do you think?** The robot is 1 m wide, a body 0.5 m. In which of these corridors does it pass? How near?
 

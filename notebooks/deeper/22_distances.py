@@ -313,19 +313,19 @@ record.check(
 record.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * gap
 
 # %% [markdown]
-# ## The true distance itself
+# ## The Euclidean distance itself
 #
-# The required margin costs space beside short walls. `MPCSettings.among_people()` measures walls by their true distance
+# The required margin costs space beside short walls. `MPCSettings.among_people()` measures walls by Euclidean distance
 # (`margin="euclidean"`): then eps is enough everywhere. Why does `MPCSettings()` not do the same?
 #
 # **What do you think?** In the paper's scenario *waiting* the robot goes around the corner of a wall into a pathway.
-# Three robots have the distance of the table, and barriers on $N_h$ steps of their plan. Which of them arrive?
+# Each robot has one row of the table: its distance, and the number $N_h$ of steps with barriers. Which of them arrive?
 
 # %%
 robots = {
     "paper's distance, required margin, N_h = 2": {},
-    "true distance, N_h = 2": {"margin": "euclidean"},
-    "true distance, N_h = 3": {"margin": "euclidean", "N_h": 3},
+    "Euclidean distance, N_h = 2": {"margin": "euclidean"},
+    "Euclidean distance, N_h = 3": {"margin": "euclidean", "N_h": 3},
 }
 waiting, times = szlib.SCENARIOS["waiting"], {}
 for name, changes in robots.items():
@@ -336,7 +336,7 @@ pd.Series(times, name="time to the goal [s]").round(1).to_frame()
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# With the true distance and $N_h = 2$ the robot stands still before the wall, beside the corner (NaN: it does not arrive). Only
+# With the Euclidean distance and $N_h = 2$ the robot stands still before the wall, beside the corner (NaN: it does not arrive). Only
 # two steps of its plan obey the barriers. From the third step on the plan drives through the wall, so it gains nothing
 # by going aside first. With a third step it arrives. `among_people()` has barriers on its whole plan, of 3 s.
 #
@@ -346,7 +346,9 @@ pd.Series(times, name="time to the goal [s]").round(1).to_frame()
 # Checks
 found = ", ".join(f"{time:.1f} s" for time in times.values())
 arrives = [time < np.inf for time in times.values()]
-what = "with the true distance and two steps the robot does not pass the corner; with a third step it does"
+what = (
+    "with the Euclidean distance and two steps the robot does not pass the corner; with a third step it does"
+)
 record.check(what, arrives == [True, False, True], found)
 
 # %% [markdown]
@@ -385,7 +387,8 @@ Markdown(f"""**What we know now.** Around people the approximation errs to the s
 the learned zone the robot keeps {100 * beside:.0f} cm more than it has to. At the ends of walls shorter than
 {r**2 / eps:g} m the paper's margin is too small, and our restricted pathway has such walls. The right margin is
 $r^2/L$, and `MPCSettings()` keeps it. It costs at most 0.42 r = {42 * r:.0f} cm of space, beside walls as long as the
-robot is wide. `among_people()` keeps the true distance, which costs nothing: its plan obeys the barriers on each step.""")
+robot is wide. `among_people()` measures the Euclidean distance, which needs no extra space. This works because each step of
+its plan has barriers.""")
 
 # %% jupyter={"source_hidden": true}
 # Summary of the checks

@@ -29,13 +29,14 @@ By both lines (v dt)^2 = (D^2 - 4 L^2 sin^2 beta) beta^2 / sin^2 beta <= D^2, fo
 
     chord_error = V dt / 2 * tan(beta_max / 2),     sin(beta_max) = V dt / 2 L           (5 mm by default)
 
-*From p to the disc.* The point keeps r' = r + eps + L + chord_error, and no other margin. People: the focal
-distance changes by no more than the way, so h >= 0 at p is h >= 0 at c. A wall of length l: write its
-distance as d = s + s^2 / l. With t its trimming term, 0 <= t <= d, |grad d|^2 = 1 + 4 t / l, and ds/dd is
-(1 + 4 d / l)^(-1/2): s changes by no more than the way either. h >= 0 at p says s >= r' there, so
-s >= r + eps at c, which is h >= 0. So *the disc has h >= 0 after every step that said it was safe*, where
-people keep their velocity. In between, the chord of p, seen by a person at the relative speed u, cuts at
-most (u dt)^2 / 8 r' off their zone (4 mm at 1.5 m/s), as it does for any robot: eps is for that.
+*From p to the disc.* The point keeps r' = r + eps + L + chord_error. People, and walls with
+`margin="euclidean"`: the distance changes by no more than the way, so h >= 0 at p is h >= 0 at c. Else the
+point has the margin r'^2 / l to a wall of length l. Write the paper's distance to it as d = s + s^2 / l.
+With t its trimming term, 0 <= t <= d, |grad d|^2 = 1 + 4 t / l, and ds/dd is (1 + 4 d / l)^(-1/2): s changes
+by no more than the way either. h >= 0 at p says s >= r' there, so s >= r + eps at c, which is h >= 0. So
+*the disc has h >= 0 after every step that said it was safe*, where people keep their velocity. In between,
+the chord of p, seen by a person at the relative speed u, cuts at most (u dt)^2 / 8 r' off their zone (4 mm
+at 1.5 m/s), as it does for any robot: eps is for that.
 
 *Not modelled*: wheels that need time to reach (v, omega). The plan bounds how p accelerates; the wheels
 follow with dv/dt = (acceleration of p along e) + L omega^2, so by up to V^2 / L more.

@@ -68,6 +68,7 @@ from .obstacles import (
     find_bodies,
 )
 from .people import (
+    STANDING_SPEED,
     People,
     Person,
     SpeedZone,
@@ -135,7 +136,8 @@ class MPCCBF(Controller):
     time at which it does, and add d to `state_age`. `Step.clock` says if the times do not fit.
 
     With a `route`, the plan heads for its farthest point in sight, at most `settings.lookahead` and 10 m
-    ahead of where the route passes the robot; the people and walls on it are avoided as always.
+    ahead of where the route passes the robot; the people and walls on it are avoided as always. Zones of
+    people who stand are not shrunk then: the robot waits where a zone fills a corridor.
 
     Examples
     --------
@@ -577,24 +579,25 @@ class MPCCBF(Controller):
 
 
 def _shrink_zones(scene: Scene, heading: Heading) -> Obstacles:
-    """The barriers, where zones of people who stand are not much larger than the way leaves them.
+    """The barriers; a zone of a person who stands is shrunk where the way leads through it.
 
-    A way through a zone has paid for it by the second (`szlib.control.ways`). To the plan each metre of depth
-    has a price, so without this it would stand before the zone for ever. The plan keeps out of a zone that
-    the way cuts by less than a cell, that holds the end of the way, or whose person there is no room to pass;
-    and without prices of zones and decay out of all.
+    The search pays for each second in a zone, the plan for each metre of depth. With the whole zone the robot
+    would wait in front of it for ever. A zone is shrunk until the way cuts it by a third of a cell. It stays
+    whole if the way cuts it by less than a cell, if the way ends in it, or if there is no room for `body_gap`
+    to the body. With an infinite `zone_price` or `decay_price` all zones stay whole.
     """
-    n = len(scene.people)
     s = scene.settings
-    if not (n and heading.ways and max(s.zone_price, s.decay_price) < inf):
+    is_priced = max(s.zone_price, s.decay_price) < inf
+    if not (scene.people and heading.ways and is_priced):
         return scene.barriers
     ((kind, numbers, offsets),) = scene.zones.groups
     points = heading.ways[0].points[1:]
-    h = scene.find_standing_h(*points.T)[:n]
+    stands = scene.zones.speeds < STANDING_SPEED
+    h = scene.zones.h(*points.T)
     gaps = scene.zones.gaps(*points.T).min(axis=1)
-    is_passed = (gaps >= s.body_gap) & (h[:, -1] >= 0)
-    h = h.min(axis=1)
-    depths = np.where(is_passed & (h < -CELL), h + CELL / 3, 0.0)
+    is_passed = stands & (gaps >= s.body_gap) & (h[:, -1] >= 0)
+    lowest = h.min(axis=1)
+    depths = np.where(is_passed & (lowest < -CELL), lowest + CELL / 3, 0.0)
     shrunk = Group(kind, numbers, offsets + depths)
     return scene.zones._replace(groups=(shrunk,)).joined(scene.fixed)
 

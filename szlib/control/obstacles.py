@@ -265,6 +265,11 @@ class Obstacle:
         """
         return cls.distance(x, y, t, *numbers)
 
+    @staticmethod
+    def _travel(distance: Any, *numbers: Any) -> Any:
+        """How far a robot at this `distance` must move at least to reach the obstacle [m]."""
+        return distance
+
     @classmethod
     def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
         """Boxes that hold all places nearer to obstacles than `offsets`: corners, shape (n, 2) each [m].
@@ -393,15 +398,17 @@ class Body(Obstacle):
 class Wall(Obstacle):
     """A wall: a segment, whose `numbers` are its ends (xa, ya, xb, yb) [m].
 
-    Its distance is Euclidean with `margin="euclidean"` of the settings; else it is a `PaperWall`.
+    Its distance is Euclidean. If `margin` of the settings is "required" or "paper", the controller measures
+    it as a `PaperWall`.
     """
 
     kind = "wall"
 
     def choose_kind(self, settings: MPCSettings) -> type[Obstacle]:
         """The class that measures the distance as `MPCSettings.margin` of the `settings` says."""
-        is_paper = settings.margin != "euclidean" and type(self) is Wall
-        return PaperWall if is_paper else type(self)
+        if type(self) not in (Wall, PaperWall):
+            return type(self)
+        return Wall if settings.margin == "euclidean" else PaperWall
 
     def margin(self, settings: MPCSettings) -> float:
         """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""
@@ -441,6 +448,12 @@ class PaperWall(Wall):
         """
         length, _, _ = _project(0.0, 0.0, *numbers.T)
         return super().bounds(numbers, np.minimum(offsets, np.sqrt(length * offsets)))
+
+    @staticmethod
+    def _travel(distance: Any, *numbers: Any) -> Any:
+        """The s of d = s + s^2/L: it changes by no more than the robot moves (`differential_drive`)."""
+        length, _, _ = _project(0.0, 0.0, *numbers)
+        return length / 2 * ((1 + 4 * distance / length) ** 0.5 - 1)
 
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
@@ -678,14 +691,14 @@ class Obstacles(NamedTuple):
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
         return Bound(lower.min(), gaps[:, _PARTS::_PARTS].min())
 
-    def find_travel(self, x: Array, y: Array, t: Any, s: MPCSettings) -> Array:
+    def find_travel(self, x: Array, y: Array, t: Any, body_gap: float) -> Array:
         """How far a robot must move at least until it violates a floor of each obstacle, shape (n, k) [m].
 
-        That is until h = 0, or until the gap to a body is `body_gap`, or to a wall eps. An obstacle with the
+        That is until h = 0, or until it is `body_gap` from the body of a person. An obstacle with the
         velocity w can be left out of a step of dt that begins where this is at least 2 (v + w) dt/gamma: then
         its rows hold whatever a robot does that is no faster than v. This is clear where h changes by no more
-        than the robot moves. For a `PaperWall` of length L, d = F(s) = s + s^2/L, where s is at most the gap
-        to the wall. With S the same where h = 0, which is no more than r_robot + eps,
+        than the robot moves. For a `PaperWall` of length L, d = F(s) = s + s^2/L, where s changes by no more
+        than the robot moves. With S the same where h = 0,
 
             gamma h(x_k) = gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
                          >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
@@ -696,15 +709,17 @@ class Obstacles(NamedTuple):
         ----------
         x, y : positions, shape (k,) [m].
         t : their times from now, shape (k,) [s].
-        s : settings of the robot.
+        body_gap : gap that the robot keeps to bodies [m].
         """
         found = [np.empty((0, len(x)))]
         for kind, numbers, offsets in self.groups:
             table = numbers.T[..., None]
-            far = kind.distance(x, y, t, *table) - offsets[:, None]
-            least = s.eps if kind.priority == Priority.WALL else s.body_gap
-            gaps = kind.gap(x, y, t, *table) - (s.r_robot + least)
-            found.append(np.minimum(far, gaps))
+            own = kind._travel(kind.distance(x, y, t, *table), *table)
+            own = own - kind._travel(offsets, *numbers.T)[:, None]
+            if kind.priority > Priority.BODY:
+                gaps = kind.gap(x, y, t, *table) - self.r_robot
+                own = np.minimum(own, gaps - body_gap)
+            found.append(own)
         return np.concatenate(found)
 
     def _collect(

@@ -338,7 +338,7 @@ class Planner:
         x, y = states[:, :2].T
         speed = np.hypot(*states[:, 2:].T).max()
         reach = (speed + barriers.speeds) * _find_reach_time(s)
-        travel = barriers.find_travel(x, y, s.times, s)
+        travel = barriers.find_travel(x, y, s.times, s.body_gap)
         return np.asarray(travel.min(axis=1) - reach)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:

@@ -80,7 +80,7 @@ class MPCSettings:
         `szlib.control.ways`. `inf`, as in the paper: no way is looked for, and the plan heads for the goal.
         On a large map a new goal takes some 0.1 s, at most some 0.5 s; 1 s if r_robot + eps is nearly 0.
         Towards a goal that is some 500 m away the map is coarse, and doors are closed: give a nearer one.
-    eps : margin for the error of the approximate distances [m].
+    eps : margin [m], for instance for the error of the approximate distances; see `margin`.
     margin : around walls. "euclidean": eps, in Euclidean distance. By the paper's distance (eq. 3-5), which
         is greater beyond the ends: "paper": eps, which allows overlaps with the ends of walls shorter
         than r_robot^2 / eps; "required": r_robot^2 / L around a wall of length L, and at least eps.
@@ -93,7 +93,8 @@ class MPCSettings:
         in `szlib.control.mpc`.
     decay_price, zone_price : prices of a metre, and 0.1 s, of decay of h beyond gamma, and of h < 0 of a zone
         [cost per metre to the goal]. `inf`, as in the paper: violated only where no plan satisfies the row.
-        With a finite zone_price a way may lead through the zones of people who stand, if it is the cheapest.
+        A way may always lead through a zone (`szlib.control.ways`). If both prices are finite, the plan
+        follows it through zones of people who stand.
     body_gap : gap to the bodies of people that has priority over zones and decay [m].
     guard : True: the robot brakes in a step whose plan might end in a wall or a body; see
         `szlib.control.mpc`. False, as in the paper.

@@ -357,7 +357,7 @@ class Step:
             f"h of {slowest} falls faster than gamma = {s.gamma:g}, at its price; what helps: a "
             f"decay_price above {s.decay_price:g}": s.decay_price < inf
             and worst[Priority.DECAY] > TOLERANCE,
-            f"it enters a zone by {worst[Priority.ZONE]:.2g} m, at its price or on its way; what helps: "
+            f"the plan enters a zone by {worst[Priority.ZONE]:.2g} m; what helps: "
             "zone_price=inf": s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
@@ -388,7 +388,7 @@ class Step:
         names = " and ".join(self.scene.name(i) for i in holding.tolist())
         s = self.scene.settings
         away = dist(self.scene.state[:2], self.scene.goal)
-        helps = "another goal or a route" if s.decay_price < inf else "among_people()"
+        helps = "another goal" if s.decay_price < inf else "among_people()"
         return f"{away:.1f} m from the goal; held by {names or 'nothing'}; what helps: {helps}"
 
     def _advise(self, row: Row) -> str:

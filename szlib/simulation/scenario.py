@@ -60,7 +60,8 @@ class Scenario:
     start : (x, y, vx, vy) of the robot [m, m/s].
     goal : (x, y) [m].
     people : all people, at time 0.
-    walls : segments, shape (n, 2, 2) [m]; or anything else that `read_walls` accepts.
+    walls : segments, shape (n, 2, 2) [m]; or anything else that `read_walls` accepts. The attribute holds
+        segments: pieces of a straight wall are joined, and the inside of a polygon is not solid.
     claims : what the paper claims of it.
     title : title of its figures.
     duration : time limit of a run [s].
@@ -101,7 +102,7 @@ class Scenario:
         object.__setattr__(self, "people", tuple(self.people))
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         value = self.duration
-        require(0 < value < np.inf, "duration [s]", value, "positive", SolverError)
+        require(0 < value < np.inf, "duration", value, "finite, above 0", SolverError)
 
     @property
     def fixed(self) -> tuple[Obstacle, ...]:

@@ -146,7 +146,7 @@ PILLARS = Worlds(
 )
 
 
-def test_the_euclidean_margin_and_the_guard_each_avoid_short_walls():
+def test_the_required_margin_and_the_guard_each_avoid_short_walls():
     """The paper has neither, and its robot overlaps the ends of short walls."""
     careful, guarded, paper = (
         rollouts(
