@@ -245,15 +245,17 @@ def test_a_plan_that_leaves_its_guess_meets_the_walls_that_it_did_not_know(
         assert program.sum_violations() == pytest.approx(plan.violations, abs=1e-4)
 
 
-def test_no_move_makes_an_obstacle_out_of_reach_matter() -> None:
+@pytest.mark.parametrize("v", [1.0, 0.05])
+def test_no_move_makes_an_obstacle_out_of_reach_matter(v: float) -> None:
     """Its barrier condition holds wherever the robot goes within the horizon."""
-    rng, v = np.random.default_rng(1), 1.0
+    rng = np.random.default_rng(1)
     reach = v * (planner._find_reach_time(S) + S.dt * S.N)
-    fixed = [Wall(-half, 0.0, half, 0.0) for half in (5e-4, 0.05, 0.5, 2.0, 20.0)]
+    fixed = [Wall(-half, 0.0, half, 0.0) for half in (5e-4, 0.05, 0.2, 0.5, 2.0, 20.0)]
     for each in [*fixed, HalfPlane((0.0, 0.0), (0.0, 1.0))]:
         table = Obstacles.of([each], S)
         half = each.numbers[2] if isinstance(each, Wall) else 1.0
-        points = rng.uniform(-12 - half, 12 + half, (3000, 2)).tolist()
+        spread = half + 1 + 11 * v
+        points = rng.uniform(-spread, spread, (3000, 2)).tolist()
         out = np.array(
             [
                 p
