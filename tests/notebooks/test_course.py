@@ -255,7 +255,7 @@ def test_parameters_in_the_reference_are_those_of_szlib():
             ("dt", "N", "N_h", "v_max"),
             (0.1, 8, 2, 1),
         ),
-        ("| 0.5 m; 0.05 m, more at the ends", ("r_robot", "eps"), (0.5, 0.05)),
+        ("| 0.5 m; 0.05 m; `MPCSettings()` keeps", ("r_robot", "eps"), (0.5, 0.05)),
         ("| gamma | 0.05 | tuned", ("gamma",), (0.05,)),
         (
             "| diag(10, 10, 1, 1); I; 10 Q |",
