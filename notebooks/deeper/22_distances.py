@@ -336,9 +336,8 @@ pd.Series(times, name="time to the goal [s]").round(1).to_frame()
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# With the Euclidean distance and $N_h = 2$ the robot stands still before the wall, beside the corner (NaN: it does not arrive). Only
-# two steps of its plan obey the barriers. From the third step on the plan drives through the wall, so it gains nothing
-# by going aside first. With a third step it arrives. `among_people()` has barriers on its whole plan, of 3 s.
+# With the Euclidean distance and $N_h = 2$ the robot stands still beside the corner (NaN). Only two steps of its plan obey the
+# barriers. From the third on it drives through the wall, so it gains nothing by going aside first.
 #
 # </details>
 
@@ -387,8 +386,8 @@ Markdown(f"""**What we know now.** Around people the approximation errs to the s
 the learned zone the robot keeps {100 * beside:.0f} cm more than it has to. At the ends of walls shorter than
 {r**2 / eps:g} m the paper's margin is too small, and our restricted pathway has such walls. The right margin is
 $r^2/L$, and `MPCSettings()` keeps it. It costs at most 0.42 r = {42 * r:.0f} cm of space, beside walls as long as the
-robot is wide. `among_people()` measures the Euclidean distance, which needs no extra space. This works because each step of
-its plan has barriers.""")
+robot is wide. `among_people()` measures the Euclidean distance, which needs no extra space: each step of its plan has
+barriers.""")
 
 # %% jupyter={"source_hidden": true}
 # Summary of the checks

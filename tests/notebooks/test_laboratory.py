@@ -159,7 +159,7 @@ def test_the_past_can_be_visited_and_goes_on_as_before():
 
 REFUSED = {
     "goal must be finite": {"goal": [1.0, np.nan]},
-    "two different end points": {"goal": [1, 1], "walls": [[0, 0, 0, 0]]},
+    "0.001 m long or longer": {"goal": [1, 1], "walls": [[0, 0, 0, 0]]},
     "N_h must be at most N": {"robots": [RobotOptions(changes={"N": 4, "N_h": 8})]},
     "the number of robots must be 1 to 2": {"robots": [RobotOptions()] * 3},
 }
@@ -305,7 +305,7 @@ def test_the_view_stays_when_a_change_is_refused():
     before = ask(lab, "step")
     refused = ask(lab, "show", 1, walls=[[-6, 2.3, 50, 2.3], [0, 0, 0, 0]])
     assert refused.pop("kind") == "error"
-    assert "two different end points" in refused.pop("text")
+    assert "0.001 m long or longer" in refused.pop("text")
     assert refused == {
         key: value for key, value in before.items() if key not in ("kind", "text")
     }
