@@ -319,7 +319,7 @@ record.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * gap
 # (`margin="euclidean"`): then eps is enough everywhere. Why does `MPCSettings()` not do the same?
 #
 # **What do you think?** In the paper's scenario *waiting* the robot goes around the corner of a wall into a pathway.
-# Each robot has one row of the table: its distance, and the number $N_h$ of steps with barriers. Which of them arrive?
+# Each robot has one row of the table. Which of them arrive?
 
 # %%
 robots = {
