@@ -319,13 +319,13 @@ record.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * gap
 # (`margin="euclidean"`): then eps is enough everywhere. Why does `MPCSettings()` not do the same?
 #
 # **What do you think?** In the paper's scenario *waiting* the robot goes around the corner of a wall into a pathway.
-# Each robot has one row of the table. Which of them arrive?
+# Each robot has a margin, and barriers on $N_h$ steps. Which of them arrive?
 
 # %%
 robots = {
-    "paper's distance, required margin, N_h = 2": {},
-    "Euclidean distance, N_h = 2": {"margin": "euclidean"},
-    "Euclidean distance, N_h = 3": {"margin": "euclidean", "N_h": 3},
+    "required, N_h = 2": {},
+    "euclidean, N_h = 2": {"margin": "euclidean"},
+    "euclidean, N_h = 3": {"margin": "euclidean", "N_h": 3},
 }
 waiting, times = szlib.SCENARIOS["waiting"], {}
 for name, changes in robots.items():
