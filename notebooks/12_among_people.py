@@ -472,7 +472,7 @@ display(movie)
 passed = {}
 for width in (2.8, 3.4, 4.0):
     y = width / 2
-    corridor = [[(9, y), (-2, y), (-2, -y), (9, -y)]]  # closed behind the robot
+    corridor = [[(9, y), (-2, y), (-2, -y), (9, -y)]]
     person = szlib.Person((4, 0))
     scene = szlib.Scenario("corridor", (0, 0, 0, 0), (8, 0), (person,), corridor, duration=20.0)
     log = szlib.simulate(scene, szlib.MPCCBF(zone, walls=corridor, settings=among))

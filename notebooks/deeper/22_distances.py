@@ -337,7 +337,7 @@ pd.Series(times, name="time to the goal [s]").round(1).to_frame()
 # <details><summary>Answer</summary>
 #
 # With the Euclidean distance and $N_h = 2$ the robot stands still beside the corner (NaN). Only two steps of its plan obey the
-# barriers. From the third on it drives through the wall, so it gains nothing by going aside first.
+# barriers. From the third on it drives through the wall.
 #
 # </details>
 
