@@ -435,6 +435,10 @@ class PaperWall(Wall):
 
     Beyond an end of a wall of length L it is s + s^2/L, with s how far a robot must move to the wall. So it
     changes by more than the robot moves, and without a margin of r_robot^2 / L the robot may overlap the end.
+
+    Parameters
+    ----------
+    numbers : the ends (xa, ya, xb, yb) [m].
     """
 
     kind = "wall"
