@@ -24,6 +24,7 @@ from szlib.control import (
     walls_from_grid,
 )
 from szlib.control.controller import advance
+from szlib.control.mpc import _shrink_zones
 from szlib.control.obstacles import Group, PaperWall
 from szlib.control.people import find_places
 from szlib.control.ways import (
@@ -34,6 +35,7 @@ from szlib.control.ways import (
     MOST_CELLS,
     SWITCH_GAIN,
     ZONE_SECOND,
+    Heading,
     Map,
     Surroundings,
     Way,
@@ -894,6 +896,22 @@ def test_a_goal_in_the_zone_of_a_person_who_stands_is_waited_for() -> None:
         x = advance(x, step.control, 0.1)
         assert step.h[0] > -0.01 and step.goal_blocked
     assert np.hypot(*x[2:]) < 0.05
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_only_zones_of_people_who_are_predicted_to_stand_are_shrunk(walks) -> None:
+    """The way passes 0.3 m beside the body, and ends outside the zone."""
+    later = Prediction([1.0, 2.0], [(1.0, 0.0), (2.0, 0.0)]) if walks else None
+    person = szlib.Person((0.0, 0.0), prediction=later)
+    scene = szlib.MPCCBF(ZONE, settings=AMONG).step(START, (3, 0), [person]).scene
+    times = np.linspace(0.0, 6.0, 61)
+    points = np.column_stack([times - 3, np.full(61, 0.85)])
+    way = Way(points, times, 6.0)
+    given = scene.barriers.groups[0].offsets
+    found = _shrink_zones(scene, Heading((3.0, 0.85), 6.0, (way,))).groups[0].offsets
+    cut = scene.zones.h(*points.T).min()
+    expected = given if walks else given + cut + CELL / 3
+    assert cut < -CELL and found == pytest.approx(expected)
 
 
 def test_ways_know_a_prediction_beyond_the_horizon() -> None:
