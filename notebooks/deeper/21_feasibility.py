@@ -530,10 +530,10 @@ record.check("somebody who walks into the robot finds it at rest", speed <= 1e-3
 # - **all**: 1-5 people who walk or stand, walls in half of the worlds, any start, heading and goal;
 # - **one person** in open space; the robot starts at rest with $h \ge 0.3$ m.
 #
-# "paper" is `MPCSettings.paper()`; its solver takes ten times as long, so it drives in fewer worlds. "szlib" has our
-# defaults; each other formulation changes one of them. "paper" and "margin = paper" keep the paper's margin of 5 cm
-# around every wall, all others the margin that the wall requires (notebook 22). A *flagged* step is one that the
-# controller did not report as safe. The table is saved beside the notebooks (`python -m studies.rollout_table`).
+# "paper" is `MPCSettings.paper()`. "szlib" has our defaults; each other formulation changes one of them. "paper" and
+# "margin = paper" keep the paper's margin of 5 cm around every wall, all others the margin that the wall requires
+# (notebook 22). A *flagged* step is one that the controller did not report as safe. The table is saved beside the
+# notebooks (`python -m studies.rollout_table`).
 #
 # *In which set, and with which $\gamma$, do you expect worlds with $h < 0$?*
 

@@ -119,13 +119,12 @@ print(f"ellipse: {a:.2f} m and {b:.2f} m; circle: {np.sqrt(a * b):.2f} m")
 # %%
 of_zone = replace(WORLDS, zone=zone)  # worlds in which all people have this zone
 shared = {"seed": seed, "worlds": of_zone, "n_jobs": n_jobs, "progress": worlds > 10}
-ours = [name for name in FORMULATIONS if name != "paper"]  # its solver is slow
-rows = compare(worlds, formulations=ours, **shared)
+rows = compare(worlds, **shared)
 
 # %% jupyter={"source_hidden": true}
 # Checks
 surprises = [name for name in BEHAVIOURS if name != "as expected"]
-wrong = compare(worlds, zones=["fitted"], behaviours=surprises, formulations=ours, **shared)
+wrong = compare(worlds, zones=["fitted"], behaviours=surprises, **shared)
 violations = int(rows["unflagged_violations"].sum())
 record.check(
     "no step reported as safe led to h < 0 m",

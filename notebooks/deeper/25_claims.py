@@ -69,6 +69,7 @@ from studies import quantile_zone
 from studies import zones as zones_study
 from studies.distances import compare_distances
 from studies.folds import fold_table
+from studies.ipopt import ByIpopt
 from studies.plaza_truth import true_kinds
 from studies.pooling import pool
 from studies.sensitivity import sensitivity
@@ -663,10 +664,10 @@ record.claim(trade.claim, trade.low > 0, str(trade))
 corridor, paper, ellipse = szlib.SCENARIOS["corridor"], szlib.MPCSettings.paper(), zone.ellipses[zone_speed]
 way = szlib.simulate(corridor, szlib.MPCCBF(ellipse, walls=corridor.walls))
 moments = [way.controller_inputs(t) for t in way.time[30:55]]
-solve_times = {}
-for solver, N_h in product(("ipopt", "sqp"), range(1, paper.N + 1)):
-    settings = replace(paper, solver=solver, N_h=N_h)
-    controller = szlib.MPCCBF(ellipse, walls=corridor.walls, settings=settings)
+solve_times, solvers = {}, {"ipopt": ByIpopt, "sqp": szlib.MPCCBF}
+for solver, N_h in product(solvers, range(1, paper.N + 1)):
+    settings = replace(paper, N_h=N_h)
+    controller = solvers[solver](ellipse, walls=corridor.walls, settings=settings)
     clock = []
     for moment in moments:
         controller.step(*moment)

@@ -21,9 +21,6 @@ RESOLUTION = {"time_to_goal": 0.25, "min_h": 0.02, "min_speed": 0.05}
 def compare_chains(paper: Chain, ours: Chain, *, names: Iterable[str] = tuple(SCENARIOS)) -> pd.DataFrame:
     """Drive the paper's scenarios with the paper's chain, with each of our differences alone, and with ours.
 
-    The zone, the margin and the side rule are switched on with our solver, because IPOPT takes several times
-    as long. The row "solver" shows what that changes.
-
     Parameters
     ----------
     paper : the zone of `SocialZone.fit(method="paper")`, and `MPCSettings.paper()`.
@@ -32,16 +29,14 @@ def compare_chains(paper: Chain, ours: Chain, *, names: Iterable[str] = tuple(SC
 
     Returns
     -------
-    One row for each scenario and chain: "paper", "solver", "zone", "margin", "side rule" and "ours", with
+    One row for each scenario and chain: "paper", "zone", "margin", "side rule" and "ours", with
     time_to_goal [s], min_h [m], min_speed [m/s], passing_side, claims_held, claims (how many hold, of how
     many), and changed: whether the run differs from the paper's by more than `RESOLUTION`, in its side, or in
     its claims.
     """
-    (paper_zone, to_the_letter), (zone, own) = paper, ours
-    settings = replace(to_the_letter, solver=own.solver)
+    (paper_zone, settings), (zone, own) = paper, ours
     chains = {
         "paper": paper,
-        "solver": (paper_zone, settings),
         "zone": (zone, settings),
         "margin": (paper_zone, replace(settings, margin=own.margin)),
         "side rule": (paper_zone, replace(settings, head_on_share=own.head_on_share)),

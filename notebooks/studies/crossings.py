@@ -147,7 +147,7 @@ def find_settings(controller: str, dt: float, a_max: float) -> szlib.MPCSettings
         among = szlib.MPCSettings.among_people
         return among(body_gap=0.25, **limits).with_gamma_rate(among().gamma_rate)
     paper = szlib.MPCSettings.paper
-    return paper(solver="sqp", **limits).with_gamma_rate(paper().gamma_rate)
+    return paper(**limits).with_gamma_rate(paper().gamma_rate)
 
 
 def find_robot(controller: str, zone: str, dt: float, a_max: float) -> OrcaRobot | SzlibRobot:

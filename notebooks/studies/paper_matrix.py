@@ -68,18 +68,17 @@ PAPER_CHAIN: dict[str, Any] = {"fraction": 0.002, "n_neighbours": 20, "r_max": 2
 SPEEDS = (0.7, 1.1, 1.3)
 """Slow, that of the robot's zone, and fast [m/s]."""
 PAPER = szlib.MPCSettings.paper()
-BASE = replace(PAPER, solver="sqp")
 WEIGHTS_OF_CODE: dict[str, Any] = {"Q": (10.0,) * 4, "R": (1.0,) * 2, "P": (100.0,) * 4}
 """Of the public code that the paper uses (Zeng, Zhang and Sreenath, MPC-CBF, examples/test.m)."""
 ROBOTS = {
     PAPERS: PAPER,
-    **{f"gamma = {gamma:g}": replace(BASE, gamma=gamma) for gamma in (0.02, 0.1, 0.2, 0.4)},
-    **{f"N_h = {n}": replace(BASE, N_h=n) for n in (1, 4, 8)},
-    "weights of its code": replace(BASE, **WEIGHTS_OF_CODE),
-    "weights and gamma of its code": replace(BASE, gamma=0.4, **WEIGHTS_OF_CODE),
+    **{f"gamma = {gamma:g}": replace(PAPER, gamma=gamma) for gamma in (0.02, 0.1, 0.2, 0.4)},
+    **{f"N_h = {n}": replace(PAPER, N_h=n) for n in (1, 4, 8)},
+    "weights of its code": replace(PAPER, **WEIGHTS_OF_CODE),
+    "weights and gamma of its code": replace(PAPER, gamma=0.4, **WEIGHTS_OF_CODE),
     "ours": szlib.MPCSettings(time_limit=np.inf),
 }
-"""The paper's controller, with one change each (by our solver, which is faster); and ours."""
+"""The paper's controller, with one change each; and ours."""
 NO_BARRIER, DISTANCE, CIRCLE = "no barrier of the person", "gamma = 1", "circle of the same area"
 CONTROLS = (NO_BARRIER, DISTANCE, CIRCLE)
 LARGER = 1.2
@@ -242,7 +241,7 @@ def judge_zone(
 ) -> Iterator[dict[str, Any]]:
     """Each claim about a robot with this `zone`: one row a claim, a scenario of these `names` and a condition."""
     for condition in conditions:
-        settings = ROBOTS.get(condition, BASE)
+        settings = ROBOTS.get(condition, PAPER)
         control = condition if condition in CONTROLS else ""
         for name in (each for each in names if has_room(SCENARIOS[each], zone)):
             run = drive(SCENARIOS[name], zone, settings, control)

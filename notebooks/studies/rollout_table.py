@@ -1,11 +1,10 @@
 """The table of random worlds, with intervals.
 
-    python -m studies.rollout_table [--blocks 4] [--worlds 500] [--paper-worlds 250]
+    python -m studies.rollout_table [--blocks 4] [--worlds 500]
 
 Writes notebooks/tables/21_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds
-far apart, each share with its 95 % Clopper-Pearson interval, and the counts of the single blocks. The paper's
-controller, by IPOPT, takes ten times as long and drives in the first worlds of each block. Finished worlds are
-kept in results/rollouts, so that a run that was stopped goes on. Half an hour on one core.
+far apart, each share with its 95 % Clopper-Pearson interval, and the counts of the single blocks. Finished
+worlds are kept in results/rollouts, so that a run that was stopped goes on. Half an hour on one core.
 """
 
 from dataclasses import replace
@@ -100,13 +99,13 @@ def recompute(row: pd.Series) -> dict[str, float]:
 
 
 def main() -> None:
-    given = read_arguments(__doc__, blocks=4, worlds=500, paper_worlds=250, jobs=-1, out=WORLDS)
+    given = read_arguments(__doc__, blocks=4, worlds=500, jobs=-1, out=WORLDS)
     tables: dict[tuple[str, str], list[pd.DataFrame]] = {}
     for name, (worlds, formulations) in SETS.items():
         for block in range(given.blocks):
             for formulation in formulations:
                 table = rollouts(
-                    given.paper_worlds if formulation == "paper" else given.worlds,
+                    given.worlds,
                     RolloutSetup(worlds=worlds),
                     seed=(block + 1) * APART,
                     settings=FORMULATIONS[formulation],

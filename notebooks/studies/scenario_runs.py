@@ -72,7 +72,7 @@ def drive_both(record: NotebookRecord, scenario: Scenario, settings: szlib.MPCSe
 def list_parameters(settings: szlib.MPCSettings, *more: tuple[str, object, str, str]) -> Styler:
     """The parameters of a notebook with their sources, folded: those of all three chapters, and `more`."""
     differences = (
-        "IPOPT, 5 cm of margin around walls, no rule of the side, the zone by LOF and hull: "
+        "5 cm of margin around walls, no rule of the side, the zone by LOF and hull: "
         "gamma and a_max are ours there, too"
     )
     return parameters(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from copy import deepcopy
-from math import ceil, dist, hypot, inf
+from math import ceil, dist, inf
 from statistics import median_low
 from time import perf_counter
 from typing import Any, Protocol, Self
@@ -61,30 +61,31 @@ def advance(state: Array, control: Array, dt: float) -> Array:
 _MOST_PIECES = 64  # in which the way of a braking robot is looked at
 
 
-def find_stopping_path(state: Sequence[float], control: Array, s: MPCSettings) -> Path:
-    """Where a double integrator goes that holds a control for dt, and then brakes as hard as it can.
+def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) -> Path:
+    """Where a double integrator goes that holds each of the `inputs`, and then brakes as hard as it can.
 
     It brakes on a straight line, to rest; each part of this line is the braking path of its state.
 
     Parameters
     ----------
     state : (x, y, vx, vy) [m, m/s].
-    control : (ax, ay) [m/s2].
-    s : settings: dt and a_max.
+    inputs : the first k accelerations of a plan, shape (k, 2) [m/s2].
+    s : settings: the lengths of the steps, and a_max.
     """
-    now = np.array(state)
-    dt = s.dt
-    after = advance(now, control, dt)
-    velocity = after[2:]
-    fastest = float(np.abs(velocity).max())
-    piece = dt * max(1, ceil(fastest / s.a_max / dt / _MOST_PIECES))
+    states = [np.array(state)]
+    held = s.dt * np.array(s.step_lengths[: len(inputs)])
+    for control, dt in zip(inputs, held, strict=True):
+        states.append(advance(states[-1], control, dt))
+    position, velocity = np.split(states[-1], 2)
+    fastest = max(np.abs(velocity).max(), 1e-12)
+    piece = s.dt * max(1, ceil(fastest / s.a_max / s.dt / _MOST_PIECES))
     speeds = np.append(np.arange(fastest, 0.0, -s.a_max * piece), 0.0)
-    times = piece * np.arange(len(speeds))
-    gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / (fastest or 1.0)
-    points = np.vstack([now[:2], after[:2], after[:2] + gone[:, None] * velocity])
-    bows = 2**0.5 * s.a_max * piece**2 / 8 * np.ones(len(times))
-    bows[0] = hypot(*control) * dt**2 / 8
-    return Path(points, np.append(0.0, dt + times), bows)
+    gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / fastest
+    braked = 0 * gone + piece
+    points = np.vstack([np.array(states)[:, :2], position + gone[:, None] * velocity])
+    times = np.concatenate([[0.0], held, braked]).cumsum()
+    largest = np.append(np.hypot(*inputs.T), 2**0.5 * s.a_max + 0 * gone)
+    return Path(points, times, largest * np.diff(times) ** 2 / 8)
 
 
 class DoubleIntegrator:
@@ -248,7 +249,7 @@ class StepClock:
         last = self.now
         called = perf_counter()
         expected = "given with `stamps`, by the same clock"
-        faults = list[str]()
+        faults = []
         check_argument(not is_timed or stamps is None, "now", now, expected)
         if now is not None:
             self.now = check_finite("now", now)
@@ -304,7 +305,7 @@ class StepClock:
         self, robot: Robot, own: Array, age: float, at_first: Array
     ) -> Array:
         """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
-        spans = list[tuple[Array, float]]()
+        spans = []
         expected = f"{-self._dt:g} to {OLDEST_STATE:g} s"
         is_usable = -self._dt <= age <= OLDEST_STATE
         check_argument(is_usable, "state_age", age, expected)

@@ -56,12 +56,10 @@ from numpy.typing import ArrayLike
 from ..core.checks import Array, check_array, check_number, check_vector
 from ..zones.ellipses import Ellipse
 from .mpc import MPCCBF
-from .obstacles import Path, Point, find_bodies
+from .obstacles import Path, Point
 from .people import SpeedZone
-from .planner import Plan
-from .problem import follow_velocities
-from .settings import TOLERANCE, MPCSettings, check_argument
-from .step import Scene, Status, Step
+from .settings import MPCSettings, check_argument
+from .step import Scene, Step
 from .verification import PIECES, Sampled
 from .ways import Heading
 
@@ -142,7 +140,7 @@ class _Wheels:
         """
         at = own
         states = [self.robot.body(own)]
-        controls = list[Array]()
+        controls = []
         lasts = np.diff(times).tolist()
         for (px, py), dt in zip(points[1:].tolist(), lasts, strict=True):
             x, y, theta, *_ = at.tolist()
@@ -191,22 +189,24 @@ class DriveStep(Step):
         return float(abs(self.control.prod()))
 
     def carry(self, way: Sampled) -> Sampled:
-        """The `way` of the disc, whose wheels follow the point: arcs, of complex numbers."""
+        """The `way` of the disc, whose wheels follow the point."""
+        wheels = self.wheels
         points = way.points[::PIECES]
-        times = way.times[::PIECES]
-        _, commands = self.wheels.follow(self.own, points, times)
+        _, commands = wheels.follow(self.own, points, way.times[::PIECES])
         commands[0] = self.control
-        dt = np.diff(way.times)
-        v, omega = np.repeat(commands, PIECES, axis=0).T
-        turned = np.append(self.own[2], omega * dt).cumsum()
-        chords = v * dt * np.sinc(omega * dt / 2 / pi)
-        moves = chords * np.exp(1j * (turned[:-1] + turned[1:]) / 2)
-        at = np.append(complex(*self.own[:2]), moves).cumsum()
-        return way._replace(points=np.column_stack([at.real, at.imag]))
+        held = zip(np.repeat(commands, PIECES, axis=0), np.diff(way.times), strict=True)
+        found = [self.own]
+        for control, dt in held:
+            found.append(wheels.robot.advance(found[-1], control, dt))
+        return way._replace(points=np.array(found)[:, :2])
 
 
 class DifferentialDrive(MPCCBF):
     """Drives a robot with two wheels to a goal, outside the social zones of people and away from walls.
+
+    The disc's centre comes to within 7 cm of a goal, at any heading, if the goal is r_robot + 2 `ahead` and
+    some cm from walls and zones of people who stand. At a closer goal the robot turns its back to the
+    obstacle and goes backwards; it needs about r_robot + `ahead` there, else it moves about near the goal.
 
     The `state` that `step` takes is (x, y, theta) of the axle's middle [m, rad], or (x, y, theta, v, omega)
     [m, rad, m/s, rad/s]. The plan begins at the planned velocity of the point. If the robot was stopped or
@@ -231,10 +231,6 @@ class DifferentialDrive(MPCCBF):
     robot : how it moves: a `Unicycle`.
     v_max : speed that it can reach [m/s]; see `ahead`.
     chord_error : largest distance of the point from the straight line between two samples [m].
-    goal_clearance : distance of a goal from walls, and from zones of people who stand, at which it can be
-        reached from any side [m]; the disc's centre comes to within 7 cm, at any heading. At a closer goal
-        the robot turns its back to the obstacle and goes backwards; it needs about `goal_clearance` -
-        `ahead` there, else it moves about near the goal, some 2 `ahead` from it.
 
     Raises
     ------
@@ -280,7 +276,6 @@ class DifferentialDrive(MPCCBF):
         way = self.v_max * s.dt
         self.chord_error = way / 2 * tan(asin(way / 2 / self.ahead) / 2)
         radius = s.r_robot + (s.eps + self.ahead + self.chord_error)
-        self.goal_clearance = radius + self.ahead
         self._wheels = _Wheels(self.ahead, self.v_max)
         margin = "required" if s.margin == "paper" else s.margin
         return replace(s, r_robot=radius, eps=0.0, v_max=self.v_max, margin=margin)
@@ -319,37 +314,6 @@ class DifferentialDrive(MPCCBF):
         point = [x + here.real, y + here.imag, *velocity]
         return point, (gx + there.real, gy + there.imag)
 
-    def _choose(
-        self, scene: Scene, heading: Heading
-    ) -> tuple[Status, Plan, tuple[bool, bool]]:
-        """As of `MPCCBF`; but a robot that overlaps a body may leave it on a straight line, not brake.
-
-        Its disc cannot follow every plan away from a body: it would move towards it first.
-        """
-        found = super()._choose(scene, heading)
-        status, plan, (walls_safe, passively_safe) = found
-        rests = not plan.inputs.any()
-        is_held = status == "braking" and walls_safe and (rests or not passively_safe)
-        if not is_held or scene.tracked.unknown:
-            return found
-        x, y, theta, *_ = self._own.tolist()
-        bodies = find_bodies(scene.zones, self.settings)
-        if bodies.gaps(x, y).min(initial=0.0) >= -TOLERANCE:
-            return found
-        s = self._s
-        targets = np.zeros((s.N, 2))
-        faster = s.a_max * s.dt * np.array([cos(theta), sin(theta)])
-        for change in (-faster, faster):
-            targets[0] = scene.state[2:] + change
-            inputs = follow_velocities(s, scene.state[2:], targets)
-            leaves = plan._replace(inputs=inputs)
-            brakes, is_safe = self._guard(scene, leaves)
-            if not brakes and all(is_safe):
-                self._plan = inputs
-                self._change = np.zeros_like(inputs)
-                return "restarted", leaves, is_safe
-        return found
-
     def _finish(self, **found: Any) -> DriveStep:
         """The command with which the wheels follow the point."""
         point = Step(**found)
@@ -364,12 +328,12 @@ class DifferentialDrive(MPCCBF):
         found |= {"control": control, "scene": scene, "of_point": asked}
         return DriveStep(**found, own=self._own, wheels=self._wheels)
 
-    def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
+    def _choose_heading(self, scene: Scene) -> Heading:
         """As of `MPCCBF`, but straight to a goal so close that no wall lies between, as in a turn."""
         away = dist(scene.state[:2], scene.goal)
         if away < self._s.r_robot and not scene.tracked.unknown:
             return Heading(scene.goal, away)
-        return super()._choose_heading(scene, route)
+        return super()._choose_heading(scene)
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc whose wheels follow the point on a `path`."""

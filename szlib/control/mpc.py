@@ -48,7 +48,6 @@ from numpy.typing import ArrayLike
 
 from ..core.checks import (
     Array,
-    check_array,
     check_number,
     check_point,
     check_vector,
@@ -78,20 +77,16 @@ from .people import (
     list_knots,
 )
 from .planner import Plan, Planner
-from .problem import (
-    Question,
-    build_horizon,
-    follow_velocities,
-    plan_braking,
-    solve_by_ipopt,
-)
+from .problem import Question, follow_velocities, plan_braking
 from .settings import TOLERANCE, MPCSettings, check_argument
 from .step import Scene, Status, Step
 from .verification import AT_REST
 from .walls import find_solids, read_walls
 from .ways import CELL, Heading, WayFinder, find_target
 
-_BRAKING_ERROR = 0.02  # by which braking in steps is longer than a continuous one, more than enough [m]
+_BRAKING_ERROR = (
+    0.02  # of the way to rest, which is braked in steps, more than enough [m]
+)
 
 
 class MPCCBF(Controller):
@@ -106,7 +101,7 @@ class MPCCBF(Controller):
     zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`, such as
         a `SocialZone`, whose zone at `settings.zone_speed` is used.
     walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. Inside of
-        a polygon no step is safe. The attribute `walls` holds the segments; it may be assigned.
+        a polygon no step is safe. The attribute `walls` holds the segments.
     obstacles : what else stands still: each a `HalfPlane` or an `Obstacle` of your own; an attribute as well.
     settings : every other parameter.
     tracker : remembers people by their ids; default: `Tracker()`.
@@ -134,10 +129,6 @@ class MPCCBF(Controller):
     Latency: give the true times of measurement. `stamps` bring people to `now`; `state_age` brings the robot
     there, by the controls commanded since. If a control takes effect late, by d seconds, let `now` be the
     time at which it does, and add d to `state_age`. `Step.clock` says if the times do not fit.
-
-    With a `route`, the plan heads for its farthest point in sight, at most `settings.lookahead` and 10 m
-    ahead of where the route passes the robot; the people and walls on it are avoided as always. Zones of
-    people who stand are not shrunk then: the robot waits where a zone fills a corridor.
 
     Examples
     --------
@@ -178,13 +169,8 @@ class MPCCBF(Controller):
 
     @property
     def walls(self) -> Array:
-        """The walls, shape (n, 2, 2) [m]; others may be assigned, as by `set_walls`."""
+        """The walls, shape (n, 2, 2) [m]; see `set_walls`."""
         return self._segments
-
-    @walls.setter
-    def walls(self, walls: Any) -> None:
-        """Replace the walls: see `set_walls`."""
-        self.set_walls(walls)
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -202,9 +188,8 @@ class MPCCBF(Controller):
         return s
 
     def _take_walls(self, walls: Any) -> None:
-        segments = read_walls(walls)
+        self._segments = read_walls(walls)
         self._solids = find_solids(walls)
-        self._segments = segments
 
     def _take_obstacles(self, obstacles: Iterable[Obstacle]) -> None:
         """Build what is fixed, of the walls and these `obstacles`."""
@@ -264,7 +249,6 @@ class MPCCBF(Controller):
         ids: Iterable[Hashable] | None = None,
         stamps: ArrayLike | None = None,
         now: float | None = None,
-        route: ArrayLike | None = None,
         state_age: float = 0.0,
     ) -> Step:
         """Decide the acceleration for the next `dt`.
@@ -278,8 +262,6 @@ class MPCCBF(Controller):
             `Person`. See `Tracker`.
         stamps : when they were measured, one time for each or one for all [s]; default: now.
         now : time, by the same clock [s]; default: `dt` after the last step.
-        route : a way to the goal from a global planner, corners, shape (m, 2) [m]; default: a way of its own
-            (`Step.ways`) if `settings.lookahead` is finite, else none.
         state_age : time from the measurement of `state` to `now`, at most 1 s [s]; down to -dt, by jitter, it
             counts as 0.
 
@@ -295,7 +277,7 @@ class MPCCBF(Controller):
         x, towards = self._locate(state, check_point("goal", goal), age)
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._make_scene(x, towards, tracked, is_point=True)
-        heading = self._choose_heading(scene, route)
+        heading = self._choose_heading(scene)
         remaining = heading.length if heading.length < inf else dist(x[:2], towards)
         self._planner.budget.begin(began)
         status, plan, (walls_safe, passively_safe) = self._choose(scene, heading)
@@ -359,11 +341,6 @@ class MPCCBF(Controller):
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
         question = Question(state, heading.target, last, _shrink_zones(scene, heading))
         guess = self._plan + self._change
-        if s.solver == "ipopt":
-            near = self._planner.keep_reachable(question, guess)
-            inputs = solve_by_ipopt(s, near, guess.clip(-s.a_max, s.a_max))
-            if inputs is not None:
-                return "optimal", Plan(inputs, 0.0, (), False, False)
         plan = self._planner.plan(question, guess)
         if heading.is_searched and not plan.timed_out:
             targets = np.gradient(heading.ways[0].at(s.times), s.times, axis=0)[1:]
@@ -386,67 +363,53 @@ class MPCCBF(Controller):
         That is whether it touches nothing fixed, and whether it overlaps no body besides.
         """
         s = self._s
-        state = scene.state
-        control = plan.inputs[0]
-        is_wall_far, is_body_far = self._find_far(scene, control)
-        if is_wall_far and is_body_far:
+        walls, bodies = self._find_near(scene, plan.inputs[0])
+        if not (walls.groups or bodies.groups):
             return False, (True, True)
-        bodies = find_bodies(scene.zones, self.settings)
-        path = self._carry(find_stopping_path(state, control, s))
-        wall = Bound() if is_wall_far else self._walls.bound(path)
-        body = Bound() if is_body_far else self._bound_bodies(bodies, path)
+
+        def follow(n: int) -> Path:
+            """Where the robot goes that follows `n` steps of the plan, and then brakes."""
+            return self._carry(find_stopping_path(scene.state, plan.inputs[:n], s))
+
+        path = follow(1)
+        wall = walls.bound(path)
+        body = self._bound_bodies(bodies, path)
         walls_safe = wall.is_safe
-        is_safe = body.is_safe
-        if not is_safe:
-            followed = self._carry(self._follow_plan(scene, plan.inputs))
-            is_safe = self._bound_bodies(bodies, followed).is_safe
+        is_safe = body.is_safe or self._bound_bodies(bodies, follow(s.N)).is_safe
         if (walls_safe and is_safe) or not s.guard:
             return False, (walls_safe, walls_safe and is_safe)
-        braking = plan_braking(s, state[2:])[0]
-        path = self._carry(find_stopping_path(state, braking, s))
-        rest = self._walls.bound(path), self._bound_bodies(bodies, path)
+        path = follow(0)
+        rest = walls.bound(path), self._bound_bodies(bodies, path)
         before, after = (body, rest[1]) if walls_safe else (wall, rest[0])
         if after.seen < min(-TOLERANCE, before.seen):
             return False, (walls_safe, False)
-        walls_safe = rest[0].is_safe
-        is_safe = rest[1].is_safe
+        walls_safe, is_safe = (each.is_safe for each in rest)
         return True, (walls_safe, walls_safe and is_safe)
 
-    def _find_far(self, scene: Scene, control: Array) -> tuple[bool, bool]:
-        """Whether the robot can touch nothing fixed before it rests, and whether it can touch no body.
+    def _find_near(self, scene: Scene, control: Array) -> tuple[Obstacles, Obstacles]:
+        """What is fixed that the robot may touch before it rests; all bodies, if it may touch one.
 
-        Within a step of `control` and the braking after it, it goes no farther than `reach`.
+        It brakes in steps, now or after one of `control`. It goes no farther than `reach`: braking now is
+        less than |v| dt / 4 longer than braking after any control, and steps add less than a_max dt^2 / 4.
         """
         s, (x, y, vx, vy), (ax, ay) = self._s, scene.state, control.tolist()
-        last_vx = vx + s.dt * ax
-        last_vy = vy + s.dt * ay
-        stop = max(abs(last_vx), abs(last_vy)) / s.a_max
-        last = hypot(last_vx, last_vy)
-        reach = (hypot(vx, vy) + last) * s.dt / 2 + stop * last / 2 + _BRAKING_ERROR
-        reach += s.r_robot - self.settings.r_robot
+        at = x, y
+        after = vx + s.dt * ax, vy + s.dt * ay
+        stop = max(map(abs, after)) / s.a_max
+        time = 1.02 * stop + 2 * s.dt
+        reach = hypot(vx, vy) * s.dt + hypot(*after) * (s.dt + stop) / 2
+        reach += s.a_max * s.dt**2 + s.r_robot - self.settings.r_robot
+        walls = bodies = Obstacles((), self.settings.r_robot)
+        place, room = self._room
+        if room - dist(place, at) < reach:
+            gaps = self._walls.gaps(*at)
+            walls = self._walls.select_near(gaps - reach)
+            self._room = at, float(gaps.min(initial=inf))
         contact = BODY_RADIUS + self.settings.r_robot + reach
-        time = stop + 2 * s.dt
-        is_body_far = all(
-            dist(person.position, (x, y)) >= contact + time * hypot(*person.velocity)
-            for person in scene.people
-        )
-        at, room = self._room
-        if room - dist(at, (x, y)) < reach:
-            room = float(self._walls.gaps(x, y).min(initial=inf))
-            self._room = at, room = (x, y), room
-        return room - dist(at, (x, y)) >= reach, is_body_far
-
-    def _follow_plan(self, scene: Scene, inputs: Array) -> Path:
-        """Where the robot goes that follows all `inputs`, and then brakes as hard as it can."""
-        s = self._s
-        horizon = build_horizon(s)
-        states = horizon.states(np.array(scene.state), inputs)
-        bows = np.diff(horizon.times) ** 2 / 8 * np.hypot(*inputs.T)
-        braking = plan_braking(s, states[-1, 2:].tolist())[0]
-        rest = find_stopping_path(states[-1].tolist(), braking, s)
-        points = np.vstack([states[:, :2], rest.points[1:]])
-        times = np.append(horizon.times, horizon.times[-1] + rest.times[1:])
-        return Path(points, times, np.append(bows, rest.bows))
+        for person in scene.people:
+            if dist(person.position, at) - contact < time * hypot(*person.velocity):
+                return walls, find_bodies(scene.zones, self.settings)
+        return walls, bodies
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc, if the point that is planned for goes along a `path`."""
@@ -493,21 +456,15 @@ class MPCCBF(Controller):
             zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 
-    def _choose_heading(self, scene: Scene, route: ArrayLike | None) -> Heading:
+    def _choose_heading(self, scene: Scene) -> Heading:
         """Where the plan heads; among unknown people, where full braking ends."""
         s = self._s
         x, y, vx, vy = scene.state
         goal = scene.goal
         at = (x, y)
-        heading = None
-        if route is not None:
-            corners = check_array("route", route, (..., 2))
-            expected = "corners, shape (m, 2)"
-            check_argument(corners.ndim < 3, "route", corners.shape, expected)
-            heading = self._ways.follow(at, goal, corners)
-        if not heading and (route is not None or s.lookahead < inf):
+        heading = Heading(goal, dist(at, goal))
+        if s.lookahead < inf:
             heading = self._ways.find(at, goal, scene.people, scene.zones)
-        heading = heading or Heading(goal, dist(at, goal))
         target = heading.target
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max
@@ -540,10 +497,6 @@ class MPCCBF(Controller):
         at = check_point("position", position)
         return self._ask((*at, 0.0, 0.0), at, people).barriers.h(*at)
 
-    def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
-        """True if h < 0 at the `goal`, because of something fixed or of who stands among `people`."""
-        return self._ask(np.zeros(4), goal, people).goal_blocked
-
     def check_start(
         self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()
     ) -> None:
@@ -572,10 +525,9 @@ class MPCCBF(Controller):
                 raise SolverError(
                     f"{fault}: h = {h[i]:.3f} m for {scene.name(i)} at {place}; choose a place where h >= 0"
                 )
-        if hypot(vx, vy) > self._s.v_max:
-            raise SolverError(
-                f"the run starts at {hypot(vx, vy):.3f} m/s; the limit is {self._s.v_max} m/s"
-            )
+        speed = hypot(vx, vy)
+        expected = f"at most v_max = {self._s.v_max:g} m/s"
+        check_argument(speed <= self._s.v_max, "speed at the start", speed, expected)
 
 
 def _shrink_zones(scene: Scene, heading: Heading) -> Obstacles:

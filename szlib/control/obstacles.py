@@ -288,10 +288,6 @@ class Obstacle:
         """Margin that the robot keeps by its `settings` [m]: eps."""
         return settings.eps
 
-    def choose_kind(self, settings: MPCSettings) -> type[Obstacle]:
-        """The class that measures this obstacle by these `settings`: its own."""
-        return type(self)
-
     @classmethod
     def speeds(cls, numbers: Array) -> Array:
         """Speeds of obstacles of this kind with these `numbers`, shape (n, m) [m/s]; here 0."""
@@ -398,17 +394,11 @@ class Body(Obstacle):
 class Wall(Obstacle):
     """A wall: a segment, whose `numbers` are its ends (xa, ya, xb, yb) [m].
 
-    Its distance is Euclidean. If `margin` of the settings is "required" or "paper", the controller measures
-    it as a `PaperWall`.
+    Its distance is Euclidean. Where `margin` of the settings is "required" or "paper", it is measured as a
+    `PaperWall`.
     """
 
     kind = "wall"
-
-    def choose_kind(self, settings: MPCSettings) -> type[Obstacle]:
-        """The class that measures the distance as `MPCSettings.margin` of the `settings` says."""
-        if type(self) not in (Wall, PaperWall):
-            return type(self)
-        return Wall if settings.margin == "euclidean" else PaperWall
 
     def margin(self, settings: MPCSettings) -> float:
         """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""
@@ -585,9 +575,12 @@ class Obstacles(NamedTuple):
     @classmethod
     def of(cls, items: Iterable[Obstacle], settings: MPCSettings) -> Obstacles:
         """The obstacles `items` of a robot with these `settings`."""
-        groups = list[Group]()
+        groups = []
+        wall = Wall if settings.margin == "euclidean" else PaperWall
+        as_measured: dict[Any, Any] = {Wall: wall, PaperWall: wall}
         for (kind, _), of_kind in groupby(
-            items, lambda each: (each.choose_kind(settings), len(each.numbers))
+            items,
+            lambda each: (as_measured.get(type(each), type(each)), len(each.numbers)),
         ):
             chosen = list(of_kind)
             numbers = np.array([each.numbers for each in chosen], float)
@@ -607,7 +600,7 @@ class Obstacles(NamedTuple):
         distances : of all, shape (n,) [m].
         multiple : of which the number of each kind is a multiple, or else that of all of this kind.
         """
-        groups = list[Group]()
+        groups = []
         rest: Any = distances
         for kind, numbers, offsets in self.groups:
             own, rest = np.split(rest, [len(offsets)])
@@ -660,7 +653,7 @@ class Obstacles(NamedTuple):
     def bound(self, path: Path, *, is_barrier: bool = False) -> Bound:
         """Lower bound of the gaps on a path, and the least gap at its points but the first.
 
-        Of the obstacles that it may reach; inf if there are none.
+        Both are inf without obstacles.
 
         Parameters
         ----------
@@ -674,13 +667,7 @@ class Obstacles(NamedTuple):
         and the obstacle move, so it is nowhere less than half of the sum of both ends less that way. The
         robot leaves a uniform motion by at most the bow.
         """
-        length = np.hypot(*np.diff(path.points, axis=0).T).sum() + path.bows.sum()
-        reach = length + self.speeds * np.ptp(path.times)
-        measure = Obstacles.h if is_barrier else Obstacles.gaps
-        x, y = path.points[0]
-        first = measure(self, x, y, path.times[0])
-        near = self.select_near(first - reach)
-        if not near.groups:
+        if not self.groups:
             return Bound()
         n = len(path.bows)
         parts = np.linspace(0.0, n, n * _PARTS + 1)
@@ -688,8 +675,8 @@ class Obstacles(NamedTuple):
             np.interp(parts, np.arange(n + 1), each)
             for each in (*path.points.T, path.times)
         )
-        gaps = measure(near, x, y, t)
-        moved = near.speeds[:, None] * np.diff(t)
+        gaps = (self.h if is_barrier else self.gaps)(x, y, t)
+        moved = self.speeds[:, None] * np.diff(t)
         reach = np.hypot(np.diff(x), np.diff(y)) + moved
         bows = np.repeat(path.bows, _PARTS)
         lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
@@ -763,7 +750,7 @@ def rebuild(kind: type[Obstacle], numbers: Sequence[float]) -> Obstacle:
 def number_kinds(obstacles: Iterable[Obstacle]) -> list[str]:
     """A name for each of the `obstacles`: its kind, and its number among those of this kind."""
     counts = Counter[str]()
-    names = list[str]()
+    names = []
     for each in obstacles:
         names.append(f"{each.kind}_{counts[each.kind]}")
         counts[each.kind] += 1

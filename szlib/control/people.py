@@ -393,7 +393,7 @@ class Tracker:
                 "hashable values, one for each; stamps must be one time [s], or one for each; got "
                 f"{people!r:.200}, {ids!r:.200}, {stamps!r:.200}: {error}"
             ) from error
-        present = list[Person]()
+        present = []
         rejected = 0
         unknown = 0
         for person, is_usable, name, time in measured:

@@ -315,21 +315,6 @@ class Planner:
             spare = np.minimum(spare, after)
             guess = plan.inputs
 
-    def keep_reachable(self, question: Question, guess: Array) -> Question:
-        """The `question` without those of many obstacles that no plan at v_max comes near.
-
-        Parameters
-        ----------
-        question : with all obstacles.
-        guess : inputs of any plan, shape (N, 2) [m/s2].
-        """
-        barriers = question.barriers
-        if barriers.size <= _MOST_UNFILTERED:
-            return question
-        apart = 2 * self.settings.v_max * self.settings.times[-1]
-        spare = self._find_spare(question, guess) - apart
-        return question._replace(barriers=barriers.select_near(spare, _MULTIPLE))
-
     def _find_spare(self, question: Question, inputs: Array) -> Array:
         """By how much each obstacle is farther from a plan than what can matter, shape (n,) [m]."""
         s = self.settings

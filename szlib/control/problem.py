@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import hypot, inf
-from threading import Lock
+from math import hypot
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -34,39 +33,6 @@ class Question(NamedTuple):
     target: Sequence[float]
     last: Sequence[float]
     barriers: Obstacles
-
-
-@lru_cache
-def build_motion(settings: MPCSettings) -> tuple[Any, ...]:
-    """The motion of a double integrator, and the cost of a plan, for these `settings`, in symbols.
-
-    Returns
-    -------
-    inputs : u_0 .. u_{N-1}, shape (2, N).
-    given : the state, the target, and the last input, 8 numbers.
-    states : x_0 .. x_N, shape (4, N+1).
-    cost : of the plan.
-    """
-    s = settings
-    inputs = ca.SX.sym("u", 2, settings.N)
-    given = ca.SX.sym("given", 8)
-    states = [given[:4]]
-    for k, length in enumerate(s.step_lengths):
-        position = states[-1][:2]
-        velocity = states[-1][2:]
-        a = inputs[:, k]
-        dt = length * s.dt
-        moved = position + dt * velocity + 0.5 * dt**2 * a
-        states.append(ca.vertcat(moved, velocity + dt * a))
-    x = ca.horzcat(*states)
-    lengths = np.array(s.step_lengths, float)
-    weights = ca.DM(np.column_stack([np.zeros(4), np.outer(s.Q, lengths[:-1]), s.P]))
-    error = x - ca.repmat(ca.vertcat(given[4:6], 0, 0), 1, s.N + 1)
-    cost = ca.dot(weights, error**2) + ca.dot(ca.DM(np.outer(s.R, lengths)), inputs**2)
-    change = inputs - ca.horzcat(given[6:], inputs[:, :-1])
-    by_jerk = np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)
-    cost += ca.dot(ca.DM(by_jerk), change**2)
-    return inputs, given, x, cost
 
 
 class Horizon(NamedTuple):
@@ -119,7 +85,7 @@ def follow_velocities(
     # complex numbers: velocities vx + i vy
     v = complex(*velocity)
     slowest = hypot(*velocity)
-    plan = list[complex]()
+    plan = []
     wanted = (targets @ (1, 1j)).tolist()
     times = s.times[1:].tolist()
     for w, length, time in zip(wanted, s.step_lengths, times, strict=True):
@@ -174,31 +140,6 @@ def list_conditions(
     return (floor,) if is_implied else (decay, floor)
 
 
-def _write_conditions(
-    s: MPCSettings, kind: Any, has_floors: bool, numbers: Any, at: Any
-) -> Any:
-    """Values of the conditions on an obstacle of a `kind`, in symbols: satisfied where they are >= 0.
-
-    Parameters
-    ----------
-    s, kind, has_floors : as of `list_conditions`.
-    numbers : of the obstacle, and its offset.
-    at : positions of the robot, shape (2, N+1).
-    """
-    *own, offset = ca.vertsplit(numbers)
-    h = [
-        kind.distance(at[0, k], at[1, k], time, *own) - offset
-        for k, time in enumerate(s.times.tolist())
-    ]
-    conditions = list_conditions(s, kind, has_floors)
-    found = [
-        h[k + 1] - keep * h[k]
-        for each in conditions
-        for k, keep in enumerate(each.keep)
-    ]
-    return ca.vertcat(*found)
-
-
 @lru_cache(maxsize=1024)
 def _linearise_kind(
     settings: MPCSettings, kind: Any, has_floors: bool, n: int, count: int
@@ -209,11 +150,19 @@ def _linearise_kind(
         return of_one.map(n, [True, False], [False, False])
     at = ca.SX.sym("at", 2, settings.N + 1)
     numbers = ca.SX.sym("numbers", count + 1)
-    values = _write_conditions(settings, kind, has_floors, numbers, at)
+    *own, offset = ca.vertsplit(numbers)
+    times = enumerate(settings.times.tolist())
+    h = [kind.distance(at[0, k], at[1, k], time, *own) - offset for k, time in times]
+    values = [
+        h[k + 1] - keep * h[k]
+        for condition in list_conditions(settings, kind, has_floors)
+        for k, keep in enumerate(condition.keep)
+    ]
     # the first state is given
     moves = ca.DM(np.kron(build_horizon(settings).to_positions, np.eye(2)))
-    slopes = (ca.jacobian(values, ca.vec(at[:, 1:])) @ ca.sparsify(moves)).T
-    results = [-values, ca.densify(slopes)]
+    rows = ca.vertcat(*values)
+    slopes = (ca.jacobian(rows, ca.vec(at[:, 1:])) @ ca.sparsify(moves)).T
+    results = [-rows, ca.densify(slopes)]
     return ca.Function("rows", [at, numbers], results, {"cse": True})
 
 
@@ -226,15 +175,32 @@ _MOST_CURVED = 1e3
 def _linearise_motion(settings: MPCSettings) -> Any:
     """The part of a quadratic program without obstacles: see `LinearProblem`."""
     s = settings
-    inputs, given, states, cost = build_motion(settings)
+    n = s.N
+    inputs = ca.SX.sym("u", 2, n)
+    given = ca.SX.sym("given", 8)
+    state = given[:4]
+    target = ca.vertcat(given[4:6], 0, 0)
+    last = given[6:]
+    states = [state]
+    cost: Any = 0.0
+    for k, m in enumerate(s.step_lengths):
+        dt = m * s.dt
+        a = inputs[:, k]
+        moved = dt * state[2:] + 0.5 * dt**2 * a
+        state += ca.vertcat(moved, dt * a)
+        weights = m * ca.DM(s.Q) if k < n - 1 else ca.DM(s.P)
+        cost += ca.dot(weights, (state - target) ** 2) + m * ca.dot(ca.DM(s.R), a**2)
+        cost += s.jerk_weight / m * ca.sumsqr(a - last)
+        last = a
+        states.append(state)
+    positions, velocity = ca.vertsplit(ca.horzcat(*states), 2)
     horizon = build_horizon(s)
     u = ca.vec(inputs)
-    n = s.N
     distance = ca.norm_2(given[4:6] - given[:2])
     multipliers = ca.SX.sym("speed", n)
     curved_by = ca.fmin(ca.fmax(-multipliers, 0), _MOST_CURVED)
     scale = 2 / (distance + 1 + ca.fabs(distance - 1))
-    velocity = states[2:, 1:]
+    velocity = velocity[:, 1:]
     # a robot that is too fast slows down as it can
     slowed = ca.norm_2(given[2:4]) - s.a_max * ca.DM(horizon.times[1:])
     limit = ca.fmax(s.v_max, slowed)
@@ -244,7 +210,7 @@ def _linearise_motion(settings: MPCSettings) -> Any:
         speed = ca.vertcat(speed, velocity[:, -1])
     is_end = np.arange(speed.numel()) >= n
     outputs = [
-        states[:2, :],
+        positions,
         ca.vertcat(-s.a_max - u, -speed),
         ca.vertcat(s.a_max - u, ca.if_else(ca.DM(is_end), -speed, 1e30)),
         ca.jacobian(speed, u).T,
@@ -349,88 +315,3 @@ def _call(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -
     for i, array in enumerate(results):
         buffer.set_res(i, array.data)
     return call, (buffer, arguments, results)
-
-
-# Measured on the approach to a person: 7 iterations instead of 9.4, in 0.65 of the time.
-_IPOPT: dict[str, Any] = {
-    "print_level": 0,
-    "sb": "yes",
-    # The start is close to the solution: the plan of the step before, by its trend.
-    "mu_init": 1e-2,
-    "bound_push": 1e-3,
-    "bound_frac": 1e-3,
-    "bound_mult_init_method": "mu-based",
-    # The problem is small and nearly quadratic: leave each barrier subproblem early, step boldly.
-    "barrier_tol_factor": 1e3,
-    "mu_linear_decrease_factor": 0.02,
-    "mu_superlinear_decrease_power": 1.9,
-    "alpha_for_y": "min-dual-infeas",
-    "fast_step_computation": "yes",
-    "min_refinement_steps": 0,
-}
-# One thread calls IPOPT at a time: it keeps its iterations in memory of its own.
-_CALL_LOCK = Lock()
-
-
-def solve_by_ipopt(
-    settings: MPCSettings, question: Question, guess: Array
-) -> Array | None:
-    """The inputs that satisfy every row and cost least, by IPOPT as in the paper, shape (N, 2); None if none.
-
-    Parameters
-    ----------
-    settings : of the controller.
-    question : what is asked.
-    guess : inputs to begin with, shape (N, 2) [m/s2].
-    """
-    s = settings
-    groups = question.barriers.groups
-    shapes = tuple((kind, *numbers.shape) for kind, numbers, _ in groups)
-    numbers = [np.column_stack(group[1:]).ravel() for group in groups]
-    given = [*question.state, *question.target, *question.last]
-    with _CALL_LOCK:
-        solver = _build_ipopt(s, shapes)
-        upper = np.full(solver.numel_out("g"), inf)
-        if s.terminal == "rest":
-            upper[-2:] = 0.0
-        found = solver(
-            x0=guess.ravel(),
-            p=np.concatenate([given, *numbers]),
-            lbx=-s.a_max,
-            ubx=s.a_max,
-            lbg=0,
-            ubg=upper,
-        )
-        is_solved = bool(solver.stats()["success"])
-    inputs = np.clip(np.asarray(found["x"]).ravel(), -s.a_max, s.a_max)
-    return inputs.reshape(-1, 2) if is_solved else None
-
-
-@lru_cache
-def _build_ipopt(settings: MPCSettings, shapes: tuple[Any, ...]) -> Any:
-    """The problem in symbols, and its solver."""
-    s = settings
-    inputs, given, x, cost = build_motion(settings)
-    numbers = list[Any]()
-    rows = list[Any]()
-    for kind, n, count in shapes:
-        own = ca.SX.sym(kind.kind, count + 1, n)
-        numbers.append(ca.vec(own))
-        rows += [_write_conditions(s, kind, False, own[:, i], x) for i in range(n)]
-    rows.append(s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T)
-    if s.terminal == "rest":
-        rows.append(x[2:, s.N])
-    of_ipopt = _IPOPT | {"max_iter": s.max_iterations}
-    for name, limit in (("cpu", s.time_limit), ("wall", s.deadline)):
-        if limit < inf:
-            of_ipopt[f"max_{name}_time"] = limit / 2
-    options: dict[str, Any] = {
-        "expand": True,
-        "print_time": False,
-        "calc_lam_p": False,
-        "show_eval_warnings": False,  # a failure shows in `Step.status`
-        "ipopt": of_ipopt,
-    }
-    parameters = ca.vertcat(given, *numbers)
-    problem = {"x": ca.vec(inputs), "p": parameters, "f": cost, "g": ca.vertcat(*rows)}
-    return ca.nlpsol("hard", "ipopt", problem, options)

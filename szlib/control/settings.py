@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import expm1, inf, log1p
 from typing import Any, Literal, get_args
@@ -17,12 +17,10 @@ check_argument = partial(require, error=SolverError)
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
 Margin = Literal["required", "euclidean", "paper"]
 Side = Literal["right", "left"]
-Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest"]
 _CHOICES = {
     "margin": Margin,
     "pass_side": Side,
-    "solver": Solver,
     "terminal": Terminal,
     "guard": Literal[True, False],
 }
@@ -37,28 +35,16 @@ _RANGES = (
     (_POSITIVE, 1.0, "in (0, 1]", "gamma"),
     (0.0, 0.5, "in [0, 0.5]", "head_on_share"),
 )
-# What the paper has instead of the default, and the settings whose default is not the paper's, by source.
-_PAPER: dict[str, Any] = {
-    "margin": "paper",
-    "head_on_share": 0.0,
-    "guard": False,
-    "solver": "ipopt",
-    "time_limit": inf,
-}
-_SOURCES = {
-    "tuned": "gamma",
-    "measured": "margin guard solver",
-    "assumed": "Q R P a_max pass_side head_on_share body_gap max_iterations time_limit deadline",
-}
 
 
 @dataclass(frozen=True)
 class MPCSettings:
     """Every parameter of the controller.
 
-    `MPCSettings()` has szlib's defaults, `MPCSettings.paper()` the paper's values to the letter.  They differ
-    in the solver, the margin around walls, the rule of the side, the guard and the time limit.  `badges`
-    gives the source of each value.
+    `MPCSettings()` has szlib's defaults, `MPCSettings.paper()` the paper's values to the letter. They differ
+    in the margin around walls, the rule of the side, the guard and the time limit. What the paper does not
+    give is tuned (gamma), measured (margin, guard) or assumed (Q, R, P, a_max, and whatever acts on the side,
+    on bodies and on the computing time).
 
     Parameters
     ----------
@@ -98,8 +84,7 @@ class MPCSettings:
     body_gap : gap to the bodies of people that has priority over zones and decay [m].
     guard : True: the robot brakes in a step whose plan might end in a wall or a body; see
         `szlib.control.mpc`. False, as in the paper.
-    solver : "sqp", the quadratic programs of `szlib.control.planner`, or "ipopt", as in the paper.
-    max_iterations : iterations of a solver.
+    max_iterations : quadratic programs of a plan: see `szlib.control.planner`.
     time_limit : computing time of the step's thread after which the plan so far is used [s]; see
         `Step.timed_out`. `inf` for none. Time of other processes does not count, so that runs are the same on
         a busy machine.
@@ -117,8 +102,6 @@ class MPCSettings:
     >>> settings = szlib.MPCSettings(gamma=0.1, terminal="rest")
     >>> settings.N_h == settings.N  # a terminal condition needs barriers on the whole horizon
     True
-    >>> settings.badges()["dt"], settings.badges()["gamma"]
-    ('paper', 'chosen')
     """
 
     dt: float = 0.1
@@ -144,7 +127,6 @@ class MPCSettings:
     zone_price: float = inf
     body_gap: float = 0.0
     guard: bool = True
-    solver: Solver = "sqp"
     max_iterations: int = 100
     time_limit: float = 0.05
     deadline: float = inf
@@ -189,17 +171,23 @@ class MPCSettings:
     def paper(cls, **changes: Any) -> MPCSettings:
         """The paper's controller to the letter (eq. 2, sec. 4), with `changes` by name.
 
-        IPOPT, a margin of 5 cm around every wall, no rule of the side, no time limit.  The paper does not
-        give gamma, Q, R, P and a_max: they are szlib's (see `badges`), as is what happens if a step has no
-        solution.
+        A margin of 5 cm around every wall, no rule of the side, no guard, no time limit. The paper does not
+        give gamma, Q, R, P and a_max: they are szlib's, as is what happens if a step has no solution. The
+        paper's solver, IPOPT, finds the same plans (notebook 08).
 
         Examples
         --------
         >>> import szlib
-        >>> szlib.MPCSettings.paper(gamma=0.1).solver
-        'ipopt'
+        >>> szlib.MPCSettings.paper(gamma=0.1).margin
+        'paper'
         """
-        return cls(**_PAPER | changes)
+        own: dict[str, Any] = {
+            "margin": "paper",
+            "head_on_share": 0.0,
+            "guard": False,
+            "time_limit": inf,
+        }
+        return cls(**own | changes)
 
     @property
     def gamma_rate(self) -> float:
@@ -264,21 +252,3 @@ class MPCSettings:
         times = np.asarray(self.dt * np.cumsum((0, *self.step_lengths)))
         times.flags.writeable = False
         return times
-
-    def badges(self) -> dict[str, str]:
-        """The source of each value, by name.
-
-        "paper", "assumed", "measured", "tuned" (on the paper's four scenarios), or "chosen" by the user.
-        """
-        return {each.name: self._find_source(each.name) for each in fields(self)}
-
-    def _find_source(self, name: str) -> str:
-        value = getattr(self, name)
-        if value == _PAPER.get(name):
-            return "paper"
-        if value != getattr(MPCSettings, name):
-            return "chosen"
-        for source, names in _SOURCES.items():
-            if name in names.split():
-                return source
-        return "paper"

@@ -27,7 +27,7 @@ HOLDS = 2e-3
 _MEANING: dict[Status, str] = {
     "optimal": "optimal, every row without a price holds",
     "relaxed": "relaxed by priorities: walls, bodies, zones, decay",
-    "restarted": "relaxed by priorities, from full braking or straight off a body",
+    "restarted": "relaxed by priorities, from full braking",
     "braking": "full braking",
 }
 
@@ -69,8 +69,7 @@ class Scene(NamedTuple):
     def find_standing_h(self, x: Any, y: Any) -> Array:
         """Barriers at `x`, `y`, shape (obstacles, ...) [m]; inf for people who walk: they leave it free."""
         h = self.barriers.h(x, y)
-        walk = [hypot(*each.velocity) >= STANDING_SPEED for each in self.people]
-        h[: len(walk)][walk] = inf
+        h[: len(self.people)][self.zones.speeds >= STANDING_SPEED] = inf
         return h
 
     @property
@@ -103,9 +102,8 @@ class Step:
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     inputs : accelerations of the plan, shape (N, 2) [m/s2].
     status : "optimal": the plan satisfies every row without a price. "relaxed": it violates the least, by
-        priorities. "restarted": the same, found from full braking instead of from the last plan; or two
-        wheels leave a body that they overlap, on a straight line. "braking": full braking, because it is
-        safer than the plan, or there is none.
+        priorities. "restarted": the same, found from full braking instead of from the last plan. "braking":
+        full braking, because it is safer than the plan, or there is none.
     walls_safe : True if the robot, which holds the control for dt and then brakes as hard as it can, touches
         nothing fixed. A robot that was walls_safe once stays so, whatever people do: see `szlib.control.mpc`.
     passively_safe : True if, besides, it overlaps no body while it moves, if people keep their velocity: if

@@ -79,15 +79,13 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
     stop = 1 - min(1.0, s.a_max * s.dt / s.v_max)
     for kind, _, offsets in scene.barriers.groups:
         own = h[first : first + len(offsets)]
-        falls = own[:, 1:] - (1 - s.gamma) ** lengths * own[:, :-1]
-        floors = own[:, 1:]
+        now, then = own[:, :-1], own[:, 1:]
         if kind.has_barrier:
+            falls = then - (1 - s.gamma) ** lengths * now
             yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
-            if kind.priority == Priority.WALL:
-                floors = floors - stop**lengths * own[:, :-1]
-            else:
-                floors = floors[:, : s.N_h]
-        yield Rows(kind.priority, kind.kind, first, floors)
+            is_fixed = kind.priority == Priority.WALL
+            then = then - stop**lengths * now if is_fixed else then[:, : s.N_h]
+        yield Rows(kind.priority, kind.kind, first, then)
         first += len(offsets)
     if len(gaps):
         yield Rows(Priority.BODY, "body", 0, gaps[:, 1:])
@@ -173,7 +171,7 @@ def verify_step(step: Any) -> Report:
     if step.of_point is None:
         compared.append(("control differs", step.control, step.inputs[0]))
     tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
-    faults = list[str]()
+    faults = []
     for name, found, given in compared:
         error = np.abs(found - given).max(initial=0.0)
         if not error <= tolerance:
@@ -224,7 +222,7 @@ def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
     """
     scene = step.scene
     s = step.asked.settings
-    is_clear = list[bool]()
+    is_clear = []
     levels = np.array([each.priority for each in scene.barriers.items], int)
     places = np.reshape([person.position for person in scene.people], (-1, 2))
     for n in (1, s.N):
@@ -268,7 +266,7 @@ def _measure(
     People keep their velocity, or move `as_predicted`.
     """
     s = scene.settings
-    found = list[Array]()
+    found = []
     for i, each in enumerate(scene.barriers.items):
         if isinstance(each, Zone):
             person = scene.people[i]

@@ -21,7 +21,6 @@ from math import acos, ceil, dist, hypot, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-import shapely
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import (
     binary_dilation,
@@ -66,8 +65,6 @@ MOST_WAYS = 3
 # the edge of a map is so far from its points, at least and at most [m]
 _AROUND = 8.0
 _FARTHEST_WALL = 35.0
-_FARTHEST = 10.0  # of a target on a route [m]
-_MOST_POINTS = 100_000  # of a route; the pieces of a longer one are longer
 _MARGIN = 4  # cells around a map
 _CHUNK = 1_000_000  # cells that are measured at once
 # places of people who stand are rounded so, and a goal is the same if it moved less [m]
@@ -262,7 +259,7 @@ class Map:
 
     def descend(self, cell: Any) -> Array:
         """Centres of the cells from `cell` to the end, shape (n, 2) [m]."""
-        found = list[int]()
+        found = []
         k = int(np.ravel_multi_index(tuple(cell), self.shape))
         while k >= 0:
             found.append(k)
@@ -318,22 +315,9 @@ class WayFinder:
             self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
             self._n_people = len(people)
         self._steps -= 1
-        heading, _ = self._head_for(m, at, self._ways[0].points)
+        heading = self._head_for(m, at, self._ways[0].points)
         length = heading.length if m.is_reached else inf
         return Heading(heading.target, length, tuple(self._ways), is_searched)
-
-    def follow(self, at: Point, goal: Point, route: Array) -> Heading | None:
-        """The target from `at` on a `route` to the `goal`, shape (m, 2) [m]; None if no point is in sight."""
-        m = self._get_map(at, goal)
-        self._steps = 0
-        self._standing = None
-        m.blocked = ~m.free
-        line = shapely.LineString(np.vstack([route, goal, goal]))
-        piece = max(m.cell, line.length / _MOST_POINTS)
-        line = shapely.segmentize(line, piece) if line.length else line
-        points = shapely.get_coordinates(line)
-        heading, is_seen = self._head_for(m, at, points)
-        return heading if is_seen else None
 
     def _get_map(self, at: Point, goal: Point) -> Map:
         """The map that holds these points."""
@@ -370,7 +354,7 @@ class WayFinder:
             last = self._ways[0]
             passed = last.times[np.hypot(*(last.points - at).T).argmin()]
             before = _find_turns(last, near.around, passed)
-        found = list[tuple[float, Way]]()
+        found = []
         for way, turns in self._find_ways(m, at, near):
             gain = SWITCH_GAIN * (np.abs(turns - before) <= pi).all()
             found.append((way.cost - gain, way))
@@ -419,18 +403,16 @@ class WayFinder:
             used[*cells.T] = True
             again += dt * REPEAT_SECOND * binary_dilation(used, iterations=_NEAR_WAY)
 
-    def _head_for(self, m: Map, at: Point, points: Array) -> tuple[Heading, bool]:
-        """The farthest of these `points` in sight, or a corner close by, and whether any is in sight."""
+    def _head_for(self, m: Map, at: Point, points: Array) -> Heading:
+        """The farthest of these `points` in sight, or a corner close by."""
         p = np.array(at)
-        farthest = min(self._s.lookahead, _FARTHEST)
         points = points[int(np.hypot(*(points - p).T).argmin()) :]
         lengths = _time(np.vstack([p, points]), 1.0)[1:]
-        n = max(2, int(np.searchsorted(lengths, farthest)))
-        seen = m.sees(p, points[:n])
-        chosen = seen | (lengths[:n] < 3 * m.cell)
+        n = max(2, int(np.searchsorted(lengths, self._s.lookahead)))
+        chosen = m.sees(p, points[:n]) | (lengths[:n] < 3 * m.cell)
         i = np.flatnonzero(chosen).max(initial=0)
         (x, y), left = points[i].tolist(), float(lengths[-1] - lengths[i])
-        return Heading((x, y), dist(at, (x, y)) + left), bool(seen.any())
+        return Heading((x, y), dist(at, (x, y)) + left)
 
 
 def _find_turns(way: Way, around: Array, since: float = 0.0) -> Array:

@@ -2,7 +2,7 @@
 
 Prints each number with its bar and its last saved value, and writes all numbers to results/bench.json.
 Seconds depend on the machine; ratios hardly do: `--save` appends the ratios to tests/benchmarks/ratios.csv.
-`--long` adds 4,000 states on which both solvers must agree, and 1,000 head-on meetings.  Names of cases
+`--long` adds 4,000 states on which IPOPT must agree, and 1,000 head-on meetings.  Names of cases
 after the options select these cases.  $SZLIB_BEFORE names a clone of an earlier commit to compare with.
 """
 
@@ -23,13 +23,14 @@ import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "notebooks")]  # helpers, and studies
 
 from benchmarks import data_growth, data_sizes, measuring, steps
 from helpers.random_states import meetings, questions
+from studies.ipopt import ByIpopt
 
 import szlib
-from szlib.control import problem
 from szlib.core.checks import Array
 from szlib.plaza.generation import make_plaza
 from szlib.tracks import datasets
@@ -71,9 +72,12 @@ CROWD = szlib.Scenario(
 )
 
 
-def controller_of(scenario: szlib.Scenario, **settings: Any) -> szlib.MPCCBF:
-    chosen = szlib.MPCSettings(**settings)
-    return szlib.MPCCBF(ZONE, walls=scenario.walls, settings=chosen)
+def controller_of(
+    scenario: szlib.Scenario,
+    make: Callable[..., szlib.MPCCBF] = szlib.MPCCBF,
+    **options: Any,
+) -> szlib.MPCCBF:
+    return make(ZONE, walls=scenario.walls, **options)
 
 
 def way(scenario: szlib.Scenario) -> list[Question]:
@@ -126,22 +130,14 @@ def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
 
 def bench_solvers(scenario: szlib.Scenario) -> dict[str, float]:
     """One control step by SQP against IPOPT, warm: as tuned here, and as it comes."""
-    sqp, ipopt = (
-        asking(controller_of(scenario, solver=name), scenario)
-        for name in ("sqp", "ipopt")
-    )
-    problem._build_ipopt.cache_clear()  # of an earlier case
-    tuned = race(scenario, {"sqp": sqp, "ipopt": ipopt})
-    options = dict(problem._IPOPT)
-    for name in options.keys() - {"print_level", "sb"}:
-        del problem._IPOPT[name]
-    problem._build_ipopt.cache_clear()
-    try:
-        plain = race(scenario, {"sqp": sqp, "plain ipopt": ipopt})
-    finally:
-        problem._IPOPT.update(options)
-        problem._build_ipopt.cache_clear()
-    return ratios(tuned, "ipopt") | ratios(plain, "plain ipopt")
+    rivals = {
+        "sqp": controller_of(scenario),
+        "ipopt": controller_of(scenario, ByIpopt),
+        "plain ipopt": controller_of(scenario, ByIpopt, options={}),
+    }
+    steps = {name: asking(each, scenario) for name, each in rivals.items()}
+    times = race(scenario, steps)
+    return ratios(times, "ipopt") | ratios(times, "plain ipopt")
 
 
 def asking(
@@ -174,12 +170,11 @@ def bench_rival() -> dict[str, float]:
 
 
 def bench_cruel(count: int) -> dict[str, float]:
-    """Steps from inside zones and walls, at speed: here solvers take longest, and the time limit counts."""
+    """Steps from inside zones and walls, at speed: they take longest, and the time limit counts."""
     from hostile.controller import attack_time
 
     tally: Counter[str] = Counter()
-    for solver in ("sqp", "ipopt"):
-        attack_time(count, tally, solver)
+    attack_time(count, tally)
     return {
         what: n
         for what, n in tally.items()
@@ -187,27 +182,8 @@ def bench_cruel(count: int) -> dict[str, float]:
     }
 
 
-def bench_build() -> dict[str, float]:
-    """IPOPT built once, against built anew at each step."""
-    scenario = szlib.SCENARIOS["passing"]
-    once, rebuilt = (controller_of(scenario, solver="ipopt") for _ in range(2))
-
-    def anew(x: Array, people: Sequence[szlib.Person], target: Array) -> None:
-        problem.build_motion.cache_clear()
-        problem._build_ipopt.cache_clear()
-        rebuilt.step(x, scenario.goal, people)
-
-    kept = race(scenario, {"once": asking(once, scenario)}, repeats=3)
-    times = kept | race(scenario, {"anew": anew}, repeats=3)
-    return {
-        "rebuilt / built once": float(
-            np.median(times["anew"]) / np.median(times["once"])
-        )
-    }
-
-
 def check_agreement(count: int) -> dict[str, float]:
-    """Both solvers on seeded states, each from nothing: where they differ, and by how much where not."""
+    """SQP and IPOPT on seeded states, each from nothing: where they differ, and by how much where not."""
     found = dict.fromkeys(
         ("states", "both solve", "same", "lower by sqp", "lower by ipopt"), 0
     )
@@ -217,8 +193,8 @@ def check_agreement(count: int) -> dict[str, float]:
         itertools.islice(questions(seed=10), count), "agreement", count
     ):
         sqp, other = (
-            question.ask(szlib.MPCSettings(solver=s, head_on_share=0.0))
-            for s in ("sqp", "ipopt")
+            question.ask(szlib.MPCSettings(head_on_share=0.0), make)
+            for make in (szlib.MPCCBF, ByIpopt)
         )
         solved = [step.status == "optimal" for step in (sqp, other)]
         found["states"] += 1
@@ -243,13 +219,13 @@ def cost_of(step: szlib.Step) -> float:
     return float(at_end + on_way + (step.inputs**2 @ s.R).sum())
 
 
-def check_meetings(count: int, solver: str) -> dict[str, float]:
+def check_meetings(count: int) -> dict[str, float]:
     """Exactly symmetric meetings: how many end at the goal, and on the side that was to be expected."""
     reached = side = 0
     for scenario, place in tqdm(
-        itertools.islice(meetings(seed=11), count), f"meetings, {solver}", count
+        itertools.islice(meetings(seed=11), count), "meetings", count
     ):
-        log = szlib.simulate(scenario, controller_of(scenario, solver=solver))
+        log = szlib.simulate(scenario, controller_of(scenario))
         reached += log.success
         side += log.metrics()["passing_side"] == (
             "left" if place == "wall" else "right"
@@ -308,7 +284,6 @@ def main() -> None:
     cases: dict[str, Callable[[], dict[str, float]]] = {
         "one person": lambda: bench_solvers(passing),
         "5 people, 4 walls": lambda: bench_solvers(CROWD),
-        "IPOPT": bench_build,
         "cruel states": lambda: bench_cruel(3000 if "--long" in sys.argv else 200),
         **steps.CASES,
         "import szlib": bench_import,
@@ -319,8 +294,7 @@ def main() -> None:
         cases["do-mpc"] = bench_rival
     if "--long" in sys.argv:
         cases["agreement"] = lambda: check_agreement(4000)
-        cases["head-on, sqp"] = lambda: check_meetings(1000, "sqp")
-        cases["head-on, ipopt"] = lambda: check_meetings(100, "ipopt")
+        cases["head-on"] = lambda: check_meetings(1000)
     if os.environ.get(datasets.DATA_DIR_VARIABLE):
         cases["1 Hz day, files to zone"] = bench_day
     if "--long" in sys.argv or os.environ.get(data_sizes.RAW_DAY_VARIABLE):

@@ -177,7 +177,7 @@ def test_a_state_that_cannot_stop_is_said_to_be_and_brakes_as_well_as_it_can() -
 @pytest.mark.parametrize("status", ["walls", "bodies"])
 def test_the_guard_of_the_paper_is_off_and_its_claims_are_true(status: str) -> None:
     """`paper()` applies its plan; the claims are made all the same."""
-    settings = szlib.MPCSettings.paper(solver="sqp")
+    settings = szlib.MPCSettings.paper()
     walls = [[(-20.0, 0.0), (20.0, 0.0)]] if status == "walls" else []
     controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
     rng, claims = np.random.default_rng(4), set()
@@ -320,7 +320,7 @@ def test_a_half_plane_belongs_to_the_promise() -> None:
 def test_a_stopping_path_is_passed_at_its_times(a_max):
     """Also if it is looked at in pieces of several steps: people are where they are at these times."""
     s = szlib.MPCSettings(a_max=a_max)
-    path = find_stopping_path((0.0, 0.0, 1.0, 0.0), np.array([-a_max, 0.0]), s)
+    path = find_stopping_path((0.0, 0.0, 1.0, 0.0), np.array([[-a_max, 0.0]]), s)
     t = path.times.clip(max=1.0 / a_max)
     assert 1.0 / a_max <= path.times[-1] + 1e-9 < 1.1 / a_max + 0.2
     expected = np.column_stack([t - a_max * t**2 / 2, 0 * t])

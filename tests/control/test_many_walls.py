@@ -161,22 +161,6 @@ def test_an_obstacle_that_comes_fast_is_met_though_many_others_are_near(n: int) 
     assert step.status == "optimal" and step.feasible
 
 
-def test_ipopt_gets_of_many_walls_those_that_it_may_come_near() -> None:
-    """Its plan is that of the other solver among all walls."""
-    walls = scattered(200)
-    paper = szlib.MPCSettings.paper(margin="required", guard=False)
-    controller = szlib.MPCCBF(ZONE, walls=walls, settings=paper)
-    state, target = np.array([0.0, 0.0, 0.3, 0.1]), GOAL
-    barriers = controller._fixed
-    question = planner.Question(state, target, (0.0, 0.0), barriers)
-    near = controller._planner.keep_reachable(question, controller._plan)
-    assert 0 < near.barriers.size < 100
-    step = controller.step(state, GOAL)
-    own = szlib.MPCCBF(ZONE, walls=walls, settings=S).step(state, GOAL)
-    assert step.status == "optimal" and step.feasible and step.verify().ok
-    assert step.inputs == pytest.approx(own.inputs, abs=1e-2)
-
-
 def test_what_is_left_out_keeps_its_zone_and_its_body_whatever_the_plan() -> None:
     """Bodies as well, where the gap to them reaches beyond the zone."""
     s = szlib.MPCSettings.among_people(body_gap=1.5, v_max=0.4)

@@ -15,6 +15,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from laboratory import plot_admissible_controls
+from studies.ipopt import ByIpopt
 
 import szlib
 from szlib.control import HalfPlane, Obstacle, Obstacles, Wall, Zone
@@ -29,7 +30,6 @@ from szlib.control.obstacles import (
     describe,
     ellipse_formula,
     number_kinds,
-    rebuild,
     restore,
     segment_formula,
 )
@@ -203,10 +203,16 @@ def some_of_each(rng: np.random.Generator) -> list[Obstacle]:
     ]
 
 
+def as_measured(each: Obstacle, s: szlib.MPCSettings) -> Obstacle:
+    """The obstacle that measures this one by these settings: of a wall, a `PaperWall` or a `Wall`."""
+    (found,) = Obstacles.of([each], s).items
+    return found
+
+
 @pytest.mark.parametrize("s", [S, EUCLIDEAN], ids=["required", "euclidean"])
 def test_h_of_a_table_of_obstacles_is_that_of_each_obstacle(s):
     rng = np.random.default_rng(3)
-    items = [rebuild(each.choose_kind(s), each.numbers) for each in some_of_each(rng)]
+    items = [as_measured(each, s) for each in some_of_each(rng)]
     table, (x, y) = Obstacles.of(items, s), rng.uniform(-4, 4, (2, 5, 6))
     t = rng.uniform(0, 2, (5, 6))
     assert identify(table.items) == identify(items) and table.size == len(items)
@@ -335,7 +341,7 @@ def braking_paths(seed: int, n: int) -> list[tuple[Path, Any]]:
     for _ in range(n):
         state = np.r_[rng.uniform(-2, 2, 2), rng.uniform(-1.5, 1.5, 2)]
         control = rng.uniform(-1, 1, 2)
-        path = find_stopping_path(state.tolist(), control, S)
+        path = find_stopping_path(state.tolist(), control[None], S)
 
         def move(t, state=state, control=control):
             """Where the robot is at a time: it brakes in steps of dt, the last one as far as needed."""
@@ -393,7 +399,7 @@ def test_the_bound_of_a_path_is_below_every_gap_on_it_and_not_far_below(is_barri
 
 
 def test_a_path_among_no_obstacles_has_no_bound():
-    path = find_stopping_path((0.0, 0.0, 1.0, 0.0), np.zeros(2), S)
+    path = find_stopping_path((0.0, 0.0, 1.0, 0.0), np.zeros((1, 2)), S)
     assert Obstacles((), 0.5).bound(path) == (np.inf, np.inf)
 
 
@@ -513,13 +519,10 @@ def test_an_obstacle_goes_through_run_log_and_figures(obstacle, kind, tmp_path: 
     assert step.verify().ok and point.scene.name(1).startswith(f"{obstacle.kind} 0 (")
 
 
-def test_a_table_is_avoided_by_either_solver_and_by_copies():
+def test_a_table_is_avoided_by_the_plans_of_ipopt_too_and_by_copies():
     table = Table(0.0, 0.2, 0.6)
     question = (-2.0, 0.0, 0.3, 0.0), (4.0, 0.0)
-    sqp, ipopt = (
-        drive_of(szlib.MPCCBF, [table], solver=solver, N_h=8)
-        for solver in ("sqp", "ipopt")
-    )
+    sqp, ipopt = (drive_of(make, [table], N_h=8) for make in (szlib.MPCCBF, ByIpopt))
     step = sqp.step(*question)
     assert step.residual.min() == pytest.approx(0, abs=1e-5), (
         "the table bounds the plan"
@@ -546,7 +549,7 @@ def test_an_obstacle_is_restored_from_its_kind_and_numbers():
         restored = restore(describe(each))
         assert restored.numbers == each.numbers
         for s in (S, EUCLIDEAN):
-            assert restored.choose_kind(s) is each.choose_kind(s)
+            assert type(as_measured(restored, s)) is type(as_measured(each, s))
     with pytest.raises(
         szlib.SolverError, match=r"kind of an obstacle must be that of a class.*'sofa'"
     ):
@@ -635,9 +638,9 @@ def test_decay_is_no_priority_of_an_obstacle():
             priority = Priority.DECAY
 
 
-def test_walls_and_obstacles_that_are_assigned_hold():
+def test_new_walls_and_obstacles_hold():
     controller = szlib.MPCCBF(ZONE)
-    controller.walls = [[(2, -3), (2, 3)]]
+    controller.set_walls([[(2, -3), (2, 3)]])
     controller.obstacles = [HalfPlane((0.0, -2.0), (0.0, 1.0))]
     step = controller.step((0, 0, 0, 0), (5, 0))
     assert [each.kind for each in step.obstacles] == ["wall", "half-plane"]

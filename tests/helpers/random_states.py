@@ -1,6 +1,6 @@
 """Random states and meetings for the controller, from a seed, for tests and benchmarks."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,12 @@ import szlib
 from szlib.core.checks import Array
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
+PAPER_ZONE = szlib.Ellipse(
+    (0.03197926920546479, -0.00029110391250195336),
+    (0.9641442601156448, 0.7550394491386551),
+    0.02296741922148504,
+)
+"""The zone of the paper's method at 1.1 m/s on the synthetic plaza of seed 0, as in notebooks 09 to 11."""
 
 
 @dataclass(frozen=True)
@@ -20,9 +26,13 @@ class Question:
     people: tuple[szlib.Person, ...]
     walls: Array
 
-    def ask(self, settings: szlib.MPCSettings) -> szlib.Step:
+    def ask(
+        self,
+        settings: szlib.MPCSettings,
+        make: Callable[..., szlib.MPCCBF] = szlib.MPCCBF,
+    ) -> szlib.Step:
         """The step of a new controller."""
-        controller = szlib.MPCCBF(ZONE, walls=self.walls, settings=settings)
+        controller = make(ZONE, walls=self.walls, settings=settings)
         return controller.step(self.state, self.goal, self.people)
 
 

@@ -250,7 +250,7 @@ def same(one: Any, other: Any, scale: float = 1.0) -> bool:
 # what is tried
 
 
-def settings_of(rng: np.random.Generator, solver: str = "sqp") -> szlib.MPCSettings:
+def settings_of(rng: np.random.Generator) -> szlib.MPCSettings:
     """Any settings that a robot may have."""
     n = int(rng.integers(1, 13))
     return szlib.MPCSettings(
@@ -272,7 +272,6 @@ def settings_of(rng: np.random.Generator, solver: str = "sqp") -> szlib.MPCSetti
         decay_price=rng.choice([np.inf, np.inf, 10 ** rng.uniform(0, 3)]),
         body_gap=rng.choice([0.0, rng.uniform(0, 0.3)]),
         guard=bool(rng.random() < 0.7),
-        solver=solver,
     )
 
 
@@ -292,15 +291,13 @@ def person_of(rng: np.random.Generator) -> szlib.Person:
     )
 
 
-def attack_steps(
-    count: int, tally: Counter[str], seed: int = 0, solver: str = "sqp"
-) -> None:
+def attack_steps(count: int, tally: Counter[str], seed: int = 0) -> None:
     """Steps in any state: driven for a while, then thrown elsewhere, with other people and goals."""
-    with tqdm(total=count, unit="step", desc=f"steps, {solver}", leave=False) as bar:
+    with tqdm(total=count, unit="step", desc="steps", leave=False) as bar:
         for k in range(count // A_SETTING):
             rng = np.random.default_rng([seed, k])
             s, here = (
-                settings_of(rng, solver),
+                settings_of(rng),
                 rng.uniform(-5, 5, (rng.integers(0, 5), 1, 2)),
             )
             turns, lengths = (
@@ -397,7 +394,7 @@ def attack_worlds(seeds: range, tally: Counter[str], **parameters: Any) -> None:
 
 
 def cruel_states(seed: int) -> Iterator[tuple[Any, Any, list[szlib.Person], list[Any]]]:
-    """Deep inside zones that move against each other, at speed, between walls: here solvers take longest."""
+    """Deep inside zones that move against each other, at speed, between walls: here steps take longest."""
     rng = np.random.default_rng(seed)
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     while True:
@@ -421,14 +418,14 @@ def cruel_states(seed: int) -> Iterator[tuple[Any, Any, list[szlib.Person], list
         yield np.r_[x, rng.uniform(-1, 1, 2) * pace], (30.0, 20.0), people, walls
 
 
-def attack_time(count: int, tally: Counter[str], solver: str, **settings: Any) -> None:
+def attack_time(count: int, tally: Counter[str], **settings: Any) -> None:
     """The time that a step takes of its thread, against its limit."""
-    s = szlib.MPCSettings(solver=solver, N_h=8, gamma=0.5, **settings)
+    s = szlib.MPCSettings(N_h=8, gamma=0.5, **settings)
     took = []
     for state, goal, people, walls in tqdm(
         islice(cruel_states(5), count),
         total=count,
-        desc=f"cruel, {solver}",
+        desc="cruel",
         leave=False,
     ):
         controller = szlib.MPCCBF(
@@ -437,14 +434,13 @@ def attack_time(count: int, tally: Counter[str], solver: str, **settings: Any) -
         begun = time.thread_time()
         step = controller.step(state, goal, people)
         took.append(time.thread_time() - begun)
-        tally[f"cruel states, {solver}"] += 1
-        tally[f"timed out, {solver}"] += int(step.timed_out)
+        tally["cruel states"] += 1
+        tally["timed out"] += int(step.timed_out)
         for fault in Judge(s, walls, people).faults(state, goal, step):
             tally[f"broken: {fault}"] += 1
     for name, share in (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)):
-        tally[f"{name} of cruel steps, {solver} [ms]"] = round(
-            1e3 * float(np.quantile(took, share)), 2
-        )
+        longest = 1e3 * float(np.quantile(took, share))
+        tally[f"{name} of cruel steps [ms]"] = round(longest, 2)
     # clocks of computing time may tick every 10 ms
     over = sum(each > 2 * s.time_limit for each in took)
     tally["broken: took longer than two limits"] += over
@@ -453,14 +449,10 @@ def attack_time(count: int, tally: Counter[str], solver: str, **settings: Any) -
 def attack(long: bool) -> Counter[str]:
     tally: Counter[str] = Counter()
     attack_steps(STEPS[long], tally)
-    attack_steps(
-        STEPS[long] // 50 * 2 // A_SETTING * A_SETTING, tally, seed=1, solver="ipopt"
-    )
     attack_worlds(range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally)
     rest = szlib.MPCSettings(terminal="rest")
     attack_worlds(
         range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally, settings=rest
     )
-    for solver in ("sqp", "ipopt"):
-        attack_time(CRUEL[long], tally, solver)
+    attack_time(CRUEL[long], tally)
     return tally

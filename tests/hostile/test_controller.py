@@ -13,14 +13,11 @@ import walls
 import szlib
 
 
-@pytest.mark.parametrize(("solver", "steps"), [("sqp", 300), ("ipopt", 100)])
-def test_every_step_is_as_reported(solver, steps):
+def test_every_step_is_as_reported():
     tally = Counter()
-    hostile.attack_steps(steps, tally, seed=2, solver=solver)
+    hostile.attack_steps(300, tally, seed=2)
     assert broken(tally) == {}
-    assert (
-        tally["steps"] > 0.9 * steps and tally["steps safe"] and tally["steps relaxed"]
-    )
+    assert tally["steps"] > 270 and tally["steps safe"] and tally["steps relaxed"]
 
 
 @pytest.mark.parametrize("terminal", ["none", "rest"])
@@ -49,10 +46,9 @@ def test_a_world_that_once_broke_a_claim_breaks_none(island, place):
     assert faults == []
 
 
-@pytest.mark.parametrize("solver", ["sqp", "ipopt"])
-def test_steps_from_cruel_states_are_as_reported(solver):
+def test_steps_from_cruel_states_are_as_reported():
     tally = Counter()
-    hostile.attack_time(15 if solver == "sqp" else 5, tally, solver)
+    hostile.attack_time(15, tally)
     assert set(broken(tally)) <= {"broken: took longer than two limits"}, (
         "the time itself is for the long suite"
     )

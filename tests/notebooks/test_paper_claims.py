@@ -342,7 +342,6 @@ def chains():
 def test_each_difference_is_switched_on_alone(chains):
     assert list(chains.loc["passing"].index) == [
         "paper",
-        "solver",
         "zone",
         "margin",
         "side rule",
@@ -350,21 +349,20 @@ def test_each_difference_is_switched_on_alone(chains):
     ]
     passing, waiting = chains.loc["passing"], chains.loc["waiting"]
     assert not passing.loc["paper", "changed"] and not waiting.loc["paper", "changed"]
-    assert not chains.xs("solver", level="chain")["changed"].any()
     assert not passing.loc["margin", "changed"], "the scenario has no walls"
     assert (
         passing.loc["zone", "changed"] and passing.loc["zone", "passing_side"] == "left"
     )
     assert passing.loc["zone", "time_to_goal"] > passing.loc["paper", "time_to_goal"]
-    assert waiting.loc["side rule", "min_h"] == waiting.loc["solver", "min_h"]
-    assert waiting.loc["margin", "min_h"] != waiting.loc["solver", "min_h"]
+    assert waiting.loc["side rule", "min_h"] == waiting.loc["paper", "min_h"]
+    assert waiting.loc["margin", "min_h"] != waiting.loc["paper", "min_h"]
 
 
 def test_the_side_is_due_to_the_rule_and_not_to_the_paper(chains):
     sides = chains.loc["passing", "passing_side"]
     assert sides[["side rule", "ours"]].tolist() == ["right", "right"]
     mirrored = szlib.Ellipse((0.03, 0.0), (0.96, 0.75), -0.02)
-    settings = szlib.MPCSettings.paper(solver="sqp")
+    settings = szlib.MPCSettings.paper()
     log = szlib.simulate(
         szlib.SCENARIOS["passing"], szlib.MPCCBF(mirrored, settings=settings)
     )

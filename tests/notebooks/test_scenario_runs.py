@@ -61,12 +61,12 @@ def test_a_change_is_described_by_what_changed():
         | {"passing_side": side, "claims_held": 2, "changed": chain == "side rule"}
         for chain, h, side in (
             ("paper", 0.17, "left"),
-            ("solver", 0.17, "left"),
+            ("margin", 0.17, "left"),
             ("side rule", 0.21, "right"),
         )
     ]
     found = pd.DataFrame(rows).set_index(["chain", "scenario"])
-    assert chains.describe_change(found, "solver", "passing") == "-"
+    assert chains.describe_change(found, "margin", "passing") == "-"
     assert (
         chains.describe_change(found, "side rule", "passing")
         == "least h 0.17 to 0.21 m; side left to right"

@@ -71,11 +71,11 @@ def test_the_arguments_of_a_study_have_their_defaults_and_types(monkeypatch):
         "study": ("claims", "zones"),
         "n": int,
         "sites": ["a", "b"],
-        "paper_worlds": 2,
+        "first_seed": 2,
     }
-    typed = ["zones", "5", "--sites", "c", "d", "--paper-worlds", "7"]
+    typed = ["zones", "5", "--sites", "c", "d", "--first-seed", "7"]
     monkeypatch.setattr("sys.argv", ["python", *typed])
     asked = vars(committed.read_arguments("", **options))
-    assert asked == {"study": "zones", "n": 5, "sites": ["c", "d"], "paper_worlds": 7}
+    assert asked == {"study": "zones", "n": 5, "sites": ["c", "d"], "first_seed": 7}
     monkeypatch.setattr("sys.argv", ["python", "claims", "5"])
     assert committed.read_arguments("", **options).sites == ["a", "b"]

@@ -267,7 +267,10 @@ def test_turn_people_changes_only_headings():
             {"start": (-1.2, 0, 0, 0)},
             r"'passing': the run starts in violation: h = -0\.\d+ m for person 0",
         ),
-        ({"start": (-4, 0, 1.2, 0)}, "starts at 1.200 m/s; the limit is 1.0 m/s"),
+        (
+            {"start": (-4, 0, 1.2, 0)},
+            "speed at the start must be at most v_max = 1 m/s; got 1.2",
+        ),
         ({"goal": (0.3, 0.0)}, "cannot be reached"),
         ({"walls": [((-5, 0.3), (5, 0.3))]}, "starts in violation: .* for wall 0"),
     ],
