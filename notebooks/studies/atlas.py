@@ -142,4 +142,5 @@ CELLS = [
 
 
 if __name__ == "__main__":
-    write_table(run_atlas(CELLS, REFERENCE, n_jobs=1), "27_atlas")
+    atlas = run_atlas(CELLS, REFERENCE, n_jobs=1)
+    write_table(atlas.round({"min_h": 4, "min_speed": 4}), "27_atlas")
