@@ -109,13 +109,13 @@ class Step:
     passively_safe : True if, besides, it overlaps no body while it moves, if people keep their velocity: if
         it brakes after dt, or if it follows the plan to its end and brakes there. It does not move towards a
         body that it overlaps already, by more than the curve of its way within a step.
-    target : point that attracts the plan, shape (2,) [m]: the goal, or the point ahead on the route, except
+    target : point that attracts the plan, shape (2,) [m]: the goal, or the point ahead on the way, except
         where the robot meets a person head-on.
     solve_time : wall-clock time of the whole step [s].
     timed_out : True if the plan was cut short because time was up (`MPCSettings.time_limit` or `deadline`).
     scene : what the step was asked.
     of_point : what the plan was asked, if it is that of a point which is not the disc's centre.
-    way_length : length of the way to the goal [m]: of the route, else straight; inf if there is none.
+    way_length : length of the way to the goal [m]; inf if there is none.
     ways : ways to the goal, the one that is taken first; empty where none was looked for (`lookahead`).
     stuck : time for which the robot has come no nearer to its goal, from 5 s on; 0 before, while it
         approaches, and at the goal [s].

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _FORMAT = "szlib.SimulationLog"
-_VERSION = 7
+_VERSION = 8
 _ARRAYS = (
     "states", "controls", "people", "predicted", "residual", "status", "safe", "slack", "solve_time",
     "stuck",
