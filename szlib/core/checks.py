@@ -19,7 +19,7 @@ Array = NDArray[np.float64]  # an array of floats
 # Largest coordinate, speed or parameter that is accepted [m, m/s, ...]. Floats are spaced 1.5e-8 there,
 # well below the tolerance of the controller. Every map projection of the Earth stays below it.
 LARGEST = 1e8
-_NUMBERS = float, int, np.float64  # types of single numbers that are checked fast
+_NUMBERS = {float, int, np.float64}  # types of single numbers that are checked fast
 
 
 def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:
@@ -77,7 +77,7 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
         raise SolverError(f"{name} must have {of}; got {array.shape}")
     array = array.astype(float)
     require(np.isfinite(array).all(), name, value, "finite", SolverError)
-    if np.abs(array).max(initial=0.0) > LARGEST:
+    if (np.abs(array) > LARGEST).any():
         raise SolverError(
             f"{name} must lie within +-{LARGEST:g}; got {array.tolist()!s:.200}; move the origin"
         )
@@ -87,10 +87,10 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
 def check_vector(name: str, value: ArrayLike, n: int) -> list[float]:
     """The `n` numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
     row: Any = value.tolist() if isinstance(value, np.ndarray) else value
-    is_row = isinstance(row, tuple | list) and len(row) == n
-    if is_row and all(type(v) in _NUMBERS and abs(v) <= LARGEST for v in row):
+    is_row = isinstance(row, tuple | list) and _NUMBERS.issuperset(map(type, row))
+    if is_row and len(row) == n and sum(map(abs, row)) <= LARGEST:
         return list(map(float, row))
-    return list(map(float, check_array(name, value, (n,))))
+    return list(check_array(name, value, (n,)).tolist())
 
 
 def check_point(name: str, value: ArrayLike) -> tuple[float, float]:
