@@ -58,13 +58,14 @@ def advance(state: Array, control: Array, dt: float) -> Array:
     return np.concatenate([position, velocity + dt * control])
 
 
-_MOST_PIECES = 64  # in which the way of a braking robot is looked at
+_MOST_PIECES = 1000  # of a braking path: more if the robot is faster than 1000 a_max dt
 
 
 def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) -> Path:
     """Where a double integrator goes that holds each of the `inputs`, and then brakes as hard as it can.
 
-    It brakes on a straight line, to rest; each part of this line is the braking path of its state.
+    It brakes on a straight line, to rest, in pieces of dt; the pieces that are left after one of them are the
+    braking path of the state there (if there are no more than `_MOST_PIECES`).
 
     Parameters
     ----------
@@ -77,14 +78,14 @@ def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) ->
     for control, dt in zip(inputs, held, strict=True):
         states.append(advance(states[-1], control, dt))
     position, velocity = np.split(states[-1], 2)
-    fastest = max(np.abs(velocity).max(), 1e-12)
+    fastest = max(np.abs(velocity).max(), 1e-12)  # no division by 0 at rest
     piece = s.dt * max(1, ceil(fastest / s.a_max / s.dt / _MOST_PIECES))
     speeds = np.append(np.arange(fastest, 0.0, -s.a_max * piece), 0.0)
     gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / fastest
-    braked = 0 * gone + piece
+    braked = np.full_like(gone, piece)
     points = np.vstack([np.array(states)[:, :2], position + gone[:, None] * velocity])
     times = np.concatenate([[0.0], held, braked]).cumsum()
-    largest = np.append(np.hypot(*inputs.T), 2**0.5 * s.a_max + 0 * gone)
+    largest = np.append(np.hypot(*inputs.T), np.full_like(gone, 2**0.5 * s.a_max))
     return Path(points, times, largest * np.diff(times) ** 2 / 8)
 
 

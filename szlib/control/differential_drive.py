@@ -107,7 +107,7 @@ class Unicycle:
         """The state after `own` when `control`, (v, omega), was held for `dt` [s]: exact, along an arc."""
         (x, y, theta, *_), (v, omega) = own.tolist(), control.tolist()
         half = omega * dt / 2
-        move = rect(v * dt * float(np.sinc(half / pi)), theta + half)
+        move = rect(v * dt * np.sinc(half / pi), theta + half)
         x = x + move.real
         y = y + move.imag
         return np.array([x, y, (theta + 2 * half + pi) % (2 * pi) - pi, v, omega])
@@ -145,11 +145,11 @@ class _Wheels:
         for (px, py), dt in zip(points[1:].tolist(), lasts, strict=True):
             x, y, theta, *_ = at.tolist()
             away = complex(px - x, py - y) - rect(self.ahead, theta)
-            share = min(1.0, self.v_max * dt / (hypot(away.real, away.imag) or 1.0))
+            share = min(1.0, self.v_max * dt / (abs(away) or 1.0))
             # xi + i eta
             move = share * (away * rect(1.0, -theta))
             beta = phase(2 * self.ahead + move)
-            way = (move * rect(1.0, -beta)).real / float(np.sinc(beta / pi))
+            way = (move * rect(1.0, -beta)).real / np.sinc(beta / pi)
             controls.append(np.array([way / dt, 2 * beta / dt]))
             at = self.robot.advance(at, controls[-1], dt)
             states.append(self.robot.body(at))

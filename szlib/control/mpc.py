@@ -84,10 +84,6 @@ from .verification import AT_REST
 from .walls import find_solids, read_walls
 from .ways import CELL, Heading, WayFinder, find_target
 
-_BRAKING_ERROR = (
-    0.02  # of the way to rest, which is braked in steps, more than enough [m]
-)
-
 
 class MPCCBF(Controller):
     """Drives a double integrator to a goal, outside the social zones of people and away from walls.
@@ -188,8 +184,7 @@ class MPCCBF(Controller):
         return s
 
     def _take_walls(self, walls: Any) -> None:
-        self._segments = read_walls(walls)
-        self._solids = find_solids(walls)
+        self._segments, self._solids = read_walls(walls), find_solids(walls)
 
     def _take_obstacles(self, obstacles: Iterable[Obstacle]) -> None:
         """Build what is fixed, of the walls and these `obstacles`."""
@@ -379,24 +374,25 @@ class MPCCBF(Controller):
         if (walls_safe and is_safe) or not s.guard:
             return False, (walls_safe, walls_safe and is_safe)
         path = follow(0)
-        rest = walls.bound(path), self._bound_bodies(bodies, path)
-        before, after = (body, rest[1]) if walls_safe else (wall, rest[0])
+        braked = walls.bound(path), self._bound_bodies(bodies, path)
+        before, after = (body, braked[1]) if walls_safe else (wall, braked[0])
         if after.seen < min(-TOLERANCE, before.seen):
             return False, (walls_safe, False)
-        walls_safe, is_safe = (each.is_safe for each in rest)
+        walls_safe, is_safe = (each.is_safe for each in braked)
         return True, (walls_safe, walls_safe and is_safe)
 
     def _find_near(self, scene: Scene, control: Array) -> tuple[Obstacles, Obstacles]:
-        """What is fixed that the robot may touch before it rests; all bodies, if it may touch one.
+        """The fixed obstacles that the robot may touch before it rests, and all bodies, or none if it is far.
 
-        It brakes in steps, now or after one of `control`. It goes no farther than `reach`: braking now is
-        less than |v| dt / 4 longer than braking after any control, and steps add less than a_max dt^2 / 4.
+        It brakes at once, or after one step with `control`. It goes no farther than `reach`: the way to brake
+        at once is less than |v| dt / 4 longer than after any control, and to brake in steps adds less than
+        a_max dt^2 / 4. `_room` is where the gap to the nearest wall was last measured, and that gap.
         """
         s, (x, y, vx, vy), (ax, ay) = self._s, scene.state, control.tolist()
         at = x, y
         after = vx + s.dt * ax, vy + s.dt * ay
         stop = max(map(abs, after)) / s.a_max
-        time = 1.02 * stop + 2 * s.dt
+        time = stop + 2 * s.dt
         reach = hypot(vx, vy) * s.dt + hypot(*after) * (s.dt + stop) / 2
         reach += s.a_max * s.dt**2 + s.r_robot - self.settings.r_robot
         walls = bodies = Obstacles((), self.settings.r_robot)

@@ -26,7 +26,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.checks import Array, check_array
+from ..core.checks import Array, check_array, check_point
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .settings import TOLERANCE, MPCSettings, check_argument
 
@@ -488,8 +488,8 @@ class HalfPlane(Obstacle):
     kind = "half-plane"
 
     def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
-        x, y = check_array("point", point, (2,)).tolist()
-        nx, ny = check_array("normal", normal, (2,)).tolist()
+        x, y = check_point("point", point)
+        nx, ny = check_point("normal", normal)
         length = hypot(nx, ny)
         check_argument(length > 0, "normal", normal, "a direction")
         super().__init__(x, y, nx / length, ny / length)

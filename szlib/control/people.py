@@ -18,6 +18,7 @@ A sensor is noisy and late, and loses people. By the ids of people,
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -380,7 +381,7 @@ class Tracker:
                 listed = np.ma.filled(np.asanyarray(people, float), np.nan).tolist()
             names = [getattr(each, "id", None) for each in listed]
             names = names if ids is None else list(ids)
-            given = set(names)
+            given = Counter(names)
             times = [now] * len(listed)
             if stamps is not None:
                 times = np.full(len(listed), stamps, float).tolist()
@@ -396,7 +397,7 @@ class Tracker:
         rejected = 0
         unknown = 0
         for person, is_usable, name, time in measured:
-            if names.count(name) > 1 or name != name:  # NaN
+            if given[name] > 1 or name != name:  # NaN
                 name = None
             last = self._last_seen.get(name)
             if is_usable and abs(now - time) <= self.memory:
@@ -447,7 +448,7 @@ class Tracker:
         return Person((x, y), velocity, id=name, heading_unknown=is_slow), is_usable
 
     def _find_lost(
-        self, person: Person, time: float, given: set[Hashable]
+        self, person: Person, time: float, given: dict[Hashable, int]
     ) -> _LastSeen | None:
         """What is known of a `person` whose id is new, by their place; it is not theirs any more."""
         away = {

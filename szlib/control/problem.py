@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import hypot
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -84,14 +83,14 @@ def follow_velocities(
     """
     # complex numbers: velocities vx + i vy
     v = complex(*velocity)
-    slowest = hypot(*velocity)
+    slowest = abs(v)
     plan = []
     wanted = (targets @ (1, 1j)).tolist()
     times = s.times[1:].tolist()
     for w, length, time in zip(wanted, s.step_lengths, times, strict=True):
         dt = s.dt * length
         limit = max(s.v_max, slowest - s.a_max * time)
-        change = min(1.0, limit / (hypot(w.real, w.imag) or 1.0)) * w - v
+        change = min(1.0, limit / (abs(w) or 1.0)) * w - v
         seconds = max(dt, abs(change.real) / s.a_max, abs(change.imag) / s.a_max)
         plan.append(change / seconds)
         v += dt * change / seconds
@@ -238,8 +237,8 @@ class LinearProblem:
 
     Attributes
     ----------
-    inputs, given, multipliers : of the plan, shape (N, 2); see `build_motion`; of the speed limits, negative
-        where one holds. To be filled.
+    inputs, given, multipliers : of the plan, shape (N, 2); the state, the target and the last input, 8
+        numbers; of the speed limits, negative where one holds. To be filled.
     lower, upper, slopes : of the rows.
     hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
     first : number of rows before those of obstacles.

@@ -89,7 +89,7 @@ class MPCSettings:
         `Step.timed_out`. `inf` for none. Time of other processes does not count, so that runs are the same on
         a busy machine.
     deadline : the same, counted by a clock on the wall from the call of `step` [s]: for a robot, whose next
-        control is due whatever else its computer does. A solver looks at it between two iterations; a
+        control is due whatever else its computer does. It is looked at between two quadratic programs; a
         problem of a new size is built first, once (with predictions up to some 0.5 s).
 
     Raises

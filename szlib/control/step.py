@@ -69,7 +69,8 @@ class Scene(NamedTuple):
     def find_standing_h(self, x: Any, y: Any) -> Array:
         """Barriers at `x`, `y`, shape (obstacles, ...) [m]; inf for people who walk: they leave it free."""
         h = self.barriers.h(x, y)
-        h[: len(self.people)][self.zones.speeds >= STANDING_SPEED] = inf
+        walk = [hypot(*each.velocity) >= STANDING_SPEED for each in self.people]
+        h[: len(walk)][walk] = inf
         return h
 
     @property

@@ -25,7 +25,7 @@ from .settings import TOLERANCE, MPCSettings
 ROUNDING = 1e-7
 PIECES = 16  # of a step, at whose ends gaps are computed
 _SAMPLES = PIECES + 1
-_MOST_PIECES = 64  # in which braking is looked at
+_MOST_PIECES = 1000  # of a braking path
 # A robot that moves less than this for a step is never faster than 1 mm/s within it: it rests [m/s].
 AT_REST = 2.5e-4
 

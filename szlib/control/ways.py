@@ -65,6 +65,7 @@ MOST_WAYS = 3
 # the edge of a map is so far from its points, at least and at most [m]
 _AROUND = 8.0
 _FARTHEST_WALL = 35.0
+_FARTHEST = 10.0  # of a target on a way [m]
 _MARGIN = 4  # cells around a map
 _CHUNK = 1_000_000  # cells that are measured at once
 # places of people who stand are rounded so, and a goal is the same if it moved less [m]
@@ -406,9 +407,10 @@ class WayFinder:
     def _head_for(self, m: Map, at: Point, points: Array) -> Heading:
         """The farthest of these `points` in sight, or a corner close by."""
         p = np.array(at)
+        farthest = min(self._s.lookahead, _FARTHEST)
         points = points[int(np.hypot(*(points - p).T).argmin()) :]
         lengths = _time(np.vstack([p, points]), 1.0)[1:]
-        n = max(2, int(np.searchsorted(lengths, self._s.lookahead)))
+        n = max(2, int(np.searchsorted(lengths, farthest)))
         chosen = m.sees(p, points[:n]) | (lengths[:n] < 3 * m.cell)
         i = np.flatnonzero(chosen).max(initial=0)
         (x, y), left = points[i].tolist(), float(lengths[-1] - lengths[i])

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]  # an array of floats
 # Largest coordinate, speed or parameter that is accepted [m, m/s, ...]. Floats are spaced 1.5e-8 there,
 # well below the tolerance of the controller. Every map projection of the Earth stays below it.
 LARGEST = 1e8
-_NUMBERS = {float, int, np.float64}  # types of single numbers that are checked fast
+_NUMBERS = {float, np.float64}  # types of single numbers that are checked fast
 
 
 def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:

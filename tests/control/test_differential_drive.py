@@ -468,7 +468,7 @@ def test_a_state_of_another_shape_is_refused(state):
         szlib.DifferentialDrive(ZONE).step(state, (4.0, 0.0))
 
 
-# --- routes, and goals close to a wall ---------------------------------------------------------------
+# --- ways, and goals close to a wall ---------------------------------------------------------------
 
 
 def drive_to(
@@ -566,7 +566,7 @@ def test_forged_claims_of_the_guard_are_faults_of_a_drive_step():
 @pytest.mark.parametrize("omega_max", [2.0, 4.0])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_robot_never_moves_towards_a_person_whom_it_overlaps(seed, omega_max):
-    """Where its wheels cannot leave them it stands still, until they go."""
+    """Where its wheels cannot leave them it stands still, until they go; then it goes on."""
     rng = np.random.default_rng(seed)
     settings = szlib.MPCSettings.among_people(r_robot=0.3, v_max=0.8)
     drive = szlib.DifferentialDrive(ZONE, settings=settings, omega_max=omega_max)
@@ -582,6 +582,11 @@ def test_a_robot_never_moves_towards_a_person_whom_it_overlaps(seed, omega_max):
         gaps.append(np.hypot(*(own[:2] - person.position)) - contact)
     overlap = np.minimum(gaps, 0.0)
     assert np.diff(overlap).min() > -1e-3
+    here = own[:2].copy()
+    for _ in range(40):
+        own = drive.robot.advance(own, drive.step(own, GOAL).control, settings.dt)
+    left = np.hypot(*(GOAL - here)), np.hypot(*(GOAL - own[:2]))
+    assert left[1] < max(left[0] - 1.0, 0.2)
 
 
 def test_a_robot_that_overlaps_somebody_rests_while_another_person_is_unknown():

@@ -328,6 +328,22 @@ def test_a_stopping_path_is_passed_at_its_times(a_max):
     assert path.points[:-1] == pytest.approx(expected[:-1], abs=1e-9)
 
 
+@pytest.mark.parametrize(("dt", "a_max"), [(0.02, 0.7), (0.02, 0.5), (0.1, 0.1)])
+def test_a_robot_that_can_just_stop_can_stop_after_each_step(dt, a_max):
+    """Also if it needs more than 64 steps to rest: the bound is that of the same pieces of its way."""
+    wall = [(0.0, -50.0), (0.0, 50.0)]
+    for speed in np.linspace(0.8, 1.2, 8):
+        s = szlib.MPCSettings(dt=dt, a_max=a_max, v_max=1.3, time_limit=np.inf)
+        controller = szlib.MPCCBF(ZONE, walls=[wall], settings=s)
+        state = np.array([-(speed**2) / 2 / a_max - 0.6, 0.0, speed, 0.0])
+        path = find_stopping_path(state.tolist(), np.zeros((0, 2)), s)
+        state[0] += controller._walls.bound(path).lower - 1e-7
+        for _ in range(12):
+            step = controller.step(state, (5.0, 0.0))
+            assert step.walls_safe
+            state = advance(state, step.control, dt)
+
+
 def test_a_post_is_seen_by_the_guard_though_the_paper_hardly_sees_it() -> None:
     """With the paper's margin a short wall has h > 0 where the robot touches it; the guard takes the gap."""
     settings = szlib.MPCSettings(

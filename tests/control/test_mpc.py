@@ -316,6 +316,8 @@ def test_every_state_gets_a_control_within_bounds_and_a_true_status():
         ((1e155, 0, 0, 0), GOAL, r"state must lie within \+-1e\+08"),
         ((0, 0, 0, -2e8), GOAL, r"state must lie within"),
         ((0, 0, 0, 0), (1e155, 0), r"goal must lie within"),
+        ((10**400, 0.0, 0.0, 0.0), GOAL, r"state must be numbers"),
+        ((0, 0, 0, 0), (10**400, 0.0), r"goal must be numbers"),
     ],
 )
 def test_a_state_or_goal_that_cannot_be_used_raises_an_error(state, goal, message):

@@ -162,3 +162,11 @@ def test_a_reference_zone_is_a_zone() -> None:
 def test_no_people_are_predicted_as_no_people() -> None:
     assert predict([], [1.0], []) == []
     assert predict(np.zeros((0, 4)), [1.0, 2.0], np.zeros((0, 2, 2))) == []
+
+
+def test_a_person_who_stands_blocks_a_goal_though_the_place_gets_uncertain():
+    """Standing is a matter of the velocity: a zone that grows does not walk away."""
+    waits = Prediction([1.0, 2.0], [(1.0, 0.0)] * 2, spread=[0.2, 0.4])
+    person = szlib.Person((1.0, 0.0), prediction=waits)
+    step = szlib.MPCCBF(ZONE).step((-3.0, 0.0, 0.0, 0.0), (1.2, 0.3), [person])
+    assert step.goal_blocked

@@ -1,4 +1,4 @@
-"""The mutants are made of the code as it is."""
+"""The text of each mutant stands once in the code of today."""
 
 import tomllib
 from pathlib import Path
