@@ -21,7 +21,8 @@ while it moves: if it brakes after dt, or if it follows its plan to the end and 
 move towards a body that it overlaps already, by more than the curve within a step of the plan. If it is not
 passively safe and braking is better, the robot brakes. So it is at rest when somebody walks into it, if
 people keep their velocity and it could be (`Step.passively_safe`; passive safety: Macek et al., ECMR 2009).
-Walls go first: braking is safe for them.
+Walls go first: if a control is safe for walls, the robot brakes for a body only if braking is safe for walls,
+too.
 
 The terminal condition
 ----------------------
@@ -376,7 +377,8 @@ class MPCCBF(Controller):
         path = follow(0)
         braked = walls.bound(path), self._bound_bodies(bodies, path)
         before, after = (body, braked[1]) if walls_safe else (wall, braked[0])
-        if after.seen < min(-TOLERANCE, before.seen):
+        spares_wall = walls_safe and not braked[0].is_safe
+        if spares_wall or after.seen < min(-TOLERANCE, before.seen):
             return False, (walls_safe, False)
         walls_safe, is_safe = (each.is_safe for each in braked)
         return True, (walls_safe, walls_safe and is_safe)

@@ -328,6 +328,19 @@ def test_a_stopping_path_is_passed_at_its_times(a_max):
     assert path.points[:-1] == pytest.approx(expected[:-1], abs=1e-9)
 
 
+def test_a_control_that_spares_a_wall_is_not_given_up_for_a_body():
+    """A robot that moves at a wall, before which it cannot stop on its path, turns away from it."""
+    s = szlib.MPCSettings.among_people(r_robot=0.3, dt=0.2, time_limit=np.inf)
+    controller = szlib.MPCCBF(ZONE, walls=[[(-5, 0.351), (8, 0.351)]], settings=s)
+    state, person = np.array([0.0, 0.0, 0.9, 0.18]), szlib.Person((0.78, 0), (-0.16, 0))
+    for k in range(8):
+        step = controller.step(state, (4.0, 0.0), [person.after(0.2 * k)])
+        assert step.walls_safe and step.verify().ok
+        way = follow(controller.robot, state, step.control, 0.2)
+        assert (0.351 - 0.3 - way[:, 1]).min() > 0.0
+        state = advance(state, step.control, 0.2)
+
+
 @pytest.mark.parametrize(("dt", "a_max"), [(0.02, 0.7), (0.02, 0.5), (0.1, 0.1)])
 def test_a_robot_that_can_just_stop_can_stop_after_each_step(dt, a_max):
     """Also if it needs more than 64 steps to rest: the bound is that of the same pieces of its way."""
