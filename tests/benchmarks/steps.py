@@ -296,8 +296,8 @@ BARS: dict[str, measuring.Bars] = {
     "worlds against before": {"before / now": (">=", 2.1)},
 } | {
     f"{size} against before": {
-        "now / before median": ("<=", 0.8),
-        "now / before p95": ("<=", 0.75),
+        "now / before median": ("<=", 1.0),
+        "now / before p95": ("<=", 1.0),
     }
     for size in ("1 + 0", "5 + 4", "10 + 12")
 }
