@@ -210,9 +210,9 @@ class DifferentialDrive(MPCCBF):
 
     The `state` that `step` takes is (x, y, theta) of the axle's middle [m, rad], or (x, y, theta, v, omega)
     [m, rad, m/s, rad/s]. The plan begins at the planned velocity of the point. If the robot was stopped or
-    pushed, and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega). The
-    `goal` is that of the disc's centre. The step is a `DriveStep`, whose `control` is (v, omega), to be held
-    for the next dt.
+    pushed, and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega), but no
+    faster than the wheels. The `goal` is that of the disc's centre. The step is a `DriveStep`, whose `control`
+    is (v, omega), to be held for the next dt.
 
     Parameters
     ----------
@@ -310,9 +310,10 @@ class DifferentialDrive(MPCCBF):
         # the robot was stopped or pushed, or begins
         if not deviation <= self.settings.a_max * self.settings.dt:
             true = rect(1.0, theta) * complex(v, self.ahead * omega)
+            true *= self.v_max / max(self.v_max, abs(true))  # as fast as the wheels
             velocity = [true.real, true.imag]
-        point = [x + here.real, y + here.imag, *velocity]
-        return point, (gx + there.real, gy + there.imag)
+        goal = gx + there.real, gy + there.imag
+        return [x + here.real, y + here.imag, *velocity], goal
 
     def _finish(self, **found: Any) -> DriveStep:
         """The command with which the wheels follow the point."""

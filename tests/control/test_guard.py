@@ -328,6 +328,24 @@ def test_a_stopping_path_is_passed_at_its_times(a_max):
     assert path.points[:-1] == pytest.approx(expected[:-1], abs=1e-9)
 
 
+def test_two_wheels_that_were_pushed_keep_their_promise_about_walls():
+    """They measure -12 m/s, and obey a command of 2 m/s at once: the planned point is no faster."""
+    walls = [[(3.056, 3.462), (4.689, 3.722)], [(0.091, 3.848), (0.862, 4.19)]]
+    s = szlib.MPCSettings(dt=0.2, a_max=3, v_max=2, time_limit=np.inf, max_iterations=8)
+    drive = szlib.DifferentialDrive(ZONE, walls=walls, settings=s)
+    own = np.array([0.336, 2.736, -2.153, -12.556, -0.261])
+    rows = [(1.386, 2.799, -0.126, -2.380), (0.378, 2.290, -0.361, -0.204)]
+    later = [(2.732, 3.522, -2.272, -1.305), (-1.445, 2.577, 0.066, -0.417)]
+    for k in range(12):
+        step = drive.step(own, (-1.418, -1.309), later if k else rows)
+        assert step.walls_safe and step.verify().ok
+        assert (
+            drive._walls.gaps(*follow(drive.robot, own, step.control, 0.2).T[:2]).min()
+            > 0
+        )
+        own = drive.robot.advance(own, step.control, 0.2)
+
+
 def test_a_control_that_spares_a_wall_is_not_given_up_for_a_body():
     """A robot that moves at a wall, before which it cannot stop on its path, turns away from it."""
     s = szlib.MPCSettings.among_people(r_robot=0.3, dt=0.2, time_limit=np.inf)
