@@ -210,9 +210,9 @@ class DifferentialDrive(MPCCBF):
 
     The `state` that `step` takes is (x, y, theta) of the axle's middle [m, rad], or (x, y, theta, v, omega)
     [m, rad, m/s, rad/s]. The plan begins at the planned velocity of the point. If the robot was stopped or
-    pushed, and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega), but no
-    faster than the wheels. The `goal` is that of the disc's centre. The step is a `DriveStep`, whose `control`
-    is (v, omega), to be held for the next dt.
+    pushed, and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega), but
+    no faster than the wheels. The `goal` is that of the disc's centre. The step is a `DriveStep`, whose
+    `control` is (v, omega), to be held for the next dt.
 
     Parameters
     ----------
