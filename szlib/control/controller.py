@@ -58,7 +58,7 @@ def advance(state: Array, control: Array, dt: float) -> Array:
     return np.concatenate([position, velocity + dt * control])
 
 
-_MOST_PIECES = 1000  # of a braking path: more if the robot is faster than 1000 a_max dt
+_MOST_PIECES = 1000  # of a braking path, which are longer than dt if it needs more
 
 
 def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) -> Path:

@@ -3,7 +3,7 @@
 `verify_step` uses formulas written anew from the paper, NumPy only, without the problem's code: distances,
 barriers, rows, motion, bounds and overlaps are computed from the question (`Scene`) and the plan alone, and
 compared with what the step claims. Kinds of obstacles that are not of szlib are measured by their own
-formula.
+formula, and two wheels follow the point by the model of the robot (`Unicycle`).
 """
 
 from __future__ import annotations
