@@ -350,14 +350,14 @@ record.claim(
 # it can move and turn with the person. So the paper encloses the zone in the *smallest ellipse* (Gärtner & Schönherr, 1997).
 #
 # **A number first.** How many points fix the smallest circle around many points? Two or three: all others lie
-# inside and could be left out. An ellipse is fixed by **three to five**. They are its points of *support*.
+# inside and could be left out. They are its points of *support*.
 #
-# **What do you think?** The zone below has hundreds of points. How many of them touch the ellipse?
+# **What do you think?** The zone below has hundreds of points. How many of them fix the smallest ellipse around it?
 
 # %%
 boundary = zone.boundary(zone_speed)
 ellipse = szlib.minimum_enclosing_ellipse(boundary)
-print(f"{len(ellipse.support)} of {len(boundary)} points touch it")
+print(f"{len(ellipse.support)} of {len(boundary)} points touch it; an ellipse is fixed by three to five")
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -434,8 +434,8 @@ Markdown(
 Markdown(
     f"""**What we know now.** {len(vertices)} of {len(points):,} samples make the hull, and its slice at
 {zone_speed:g} m/s leaves a zone whose smallest ellipse is {fitted.semi_axes[0]:.2f} m x {fitted.semi_axes[1]:.2f} m. The
-zone is smallest at {smallest:.2f} m/s; near {low:.1f} and {high:.1f} m/s it is large because few people walk so slowly
-or so fast. It shrinks with every encounter that is added: chapter 05 estimates one that does not, and says how far to
+zone is smallest at {smallest:.2f} m/s; near {low:.1f} m/s, where condition 4 ends the data, and near {high:.1f} m/s,
+where few people walk so fast, the hull closes and the zone is large. It shrinks with every encounter that is added: chapter 05 estimates one that does not, and says how far to
 trust it."""
 )
 

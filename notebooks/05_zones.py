@@ -267,10 +267,10 @@ record.figure(fig, "interval")
 # </details>
 
 # %% [markdown]
-# ## A zone that does not shrink
+# ## From few encounters to many
 #
-# **What do you think?** We estimate the zone from few encounters, then from more and more. Which one levels out, the
-# hull of chapter 04 or the quantile? And does each interval contain its own estimate?
+# **What do you think?** We estimate the zone from few encounters, then from more and more. What becomes
+# of the hull of chapter 04, and of the quantile? And does each interval contain its own estimate?
 
 # %% jupyter={"source_hidden": true}
 # The zone by number of encounters, with both methods

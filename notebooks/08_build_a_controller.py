@@ -486,7 +486,7 @@ for brake in (1.0, 0.5):
     )
 
 # %% [markdown]
-# So the paper's $N = 8$ cannot end at rest at 1 m/s: it has no such guarantee (notebook 21 counts what that costs).
+# So with our bound of 1 m/s² (the paper gives none) $N = 8$ cannot end at rest at 1 m/s: there is no such guarantee (notebook 21 counts what that costs).
 #
 # **Proof 2, on paper.** Show: if the plan $(\mathbf u_0, \dots, \mathbf u_{N-1})$ obeys all limits and rows, and ends at rest, then
 # so does $(\mathbf u_1, \dots, \mathbf u_{N-1}, \mathbf 0)$ one step later. Where do you need that people stand, that $h \ge 0$, and that $\gamma \le 1$?

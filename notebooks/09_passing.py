@@ -294,7 +294,7 @@ for name, scene in szlib.SCENARIOS.items():
 # %% jupyter={"source_hidden": true}
 # Figure
 styles = ("o-", figures.BLUE), ("s--", figures.ORANGE), ("^-.", figures.GREEN), ("D:", figures.BLACK)
-titles = "Too small is slow", "Too large comes near", "Too large has no way out"
+titles = "Too small is slow", "Too large comes near", "Both ends lack plans"
 fig, panels = plt.subplots(1, 3, figsize=(12, 3.9), layout="constrained")
 for ax, (key, label), title in zip(panels, columns.items(), titles, strict=True):
     for (name, table), (line, colour) in zip(sweep.items(), styles, strict=True):
@@ -316,10 +316,12 @@ usable, longest = clean.index[clean], every["time_to_goal"].max()
 evidence = "usable: " + ", ".join(f"{each:g}" for each in usable)
 record.check("gamma is among those without an infeasible step in any scenario", gamma in usable, evidence)
 record.key["largest gamma without an infeasible step"] = float(usable.max())
+least = int(every["infeasible_steps"].sum().iloc[0])
+too_small = f" With {gammas[0]:g} there are such steps, too: {least}." if least else ""
 Markdown(
     f"<details><summary>Answer</summary>\n\nWith gamma = {gammas[0]:g} the slowest scenario takes {longest.iloc[0]:.0f} s. With a "
     "large one the robot may drive up so fast that two steps later no acceleration saves it: the step is *infeasible*. "
-    f"Without such a step in any scenario: up to {usable.max():g}.\n\n</details>"
+    f"Without such a step in any scenario: {', '.join(f'{each:g}' for each in usable)}.{too_small}\n\n</details>"
 )
 
 # %% [markdown]

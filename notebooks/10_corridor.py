@@ -25,7 +25,8 @@
 # **Question.** A person walks towards the robot in a corridor. There is room for both, but not much. Who
 # slows the robot down: the person, or the wall?
 #
-# **Expectation.** The paper: the robot slows down while it passes, because wall and zone together leave little speed.
+# **Expectation.** The paper: the robot slows down because it nears the safety boundary (sec. 4). Which boundary,
+# that of the zone or that of the wall?
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [09](09_passing.ipynb) · next: [11 - Yielding: waiting and making
@@ -154,7 +155,7 @@ print(
 print(f"both fit side by side in a corridor wider than 2 x ({reach:.2f} m + 1.1 m) = {least_width:.1f} m")
 
 # %% [markdown]
-# How slow a robot that fits becomes there depends on which row limits it.
+# The robot fits. Its speed there depends on the row that limits it.
 #
 # ## Person or wall?
 #
@@ -239,8 +240,10 @@ record.figure(fig, "admissible")
 # The answer
 shares = ", ".join(f"the {name} {100 * len(when) / len(log.time):.0f} %" for name, when in holds.items())
 again = float(log.time[row + np.argmax(log.speed[row:] > 0.5)])
+begins = sorted((float(when[0]), name) for name, when in holds.items() if len(when))
+first = "; ".join(f"the {name} holds it from {when:.1f} s" for when, name in begins).capitalize() + "."
 Markdown(
-    f"<details><summary>Answer</summary>\n\nShares of the run in which each holds it: {shares}. It is slowest at "
+    f"<details><summary>Answer</summary>\n\n{first} Shares of the run in which each holds it: {shares}. It is slowest at "
     f"{log.time[row]:.1f} s, when h is {step.h[0]:.2f} m to the person and {step.h[1:].min():.2f} m to the nearer wall; faster "
     f"than 0.5 m/s again from {again:.1f} s on; abeam at {abeam:.1f} s. So it speeds up "
     f"{'before' if again < abeam else 'after'} both are abeam: the barrier limits how fast h falls, not how fast the robot "
@@ -291,6 +294,8 @@ record.figure(fig, "widths")
 # %% jupyter={"source_hidden": true}
 # The answer
 narrow = [each for each in widths if strategies[each] == "backs out"]
+unhindered = [each for each in widths if found[each]["min_speed"] > 0.95 * slowest["person alone"]]
+begin = f"from a width of {min(unhindered):g} m on" if unhindered else "in none of these corridors"
 text = "none of these corridors" if not narrow else f"corridors up to {max(narrow):g} m wide"
 roomy = [each for each in narrow if each > least_width]
 fits = ""
@@ -300,8 +305,8 @@ if roomy:
         "hardly move, and the person is there before it has squeezed by. "
     )
 Markdown(
-    f"<details><summary>Answer</summary>\n\nIn {text} the robot goes back and lets the person through. {fits}In the widest corridor it goes {found[8.0]['min_speed']:.2f} m/s at the slowest, as beside a person in the "
-    f"open ({slowest['person alone']:.2f} m/s).\n\n</details>"
+    f"<details><summary>Answer</summary>\n\nIn {text} the robot goes back and lets the person through. {fits}It no longer notices the walls {begin}: there its "
+    f"slowest speed is that beside a person in the open ({slowest['person alone']:.2f} m/s), to 5 %.\n\n</details>"
 )
 
 # %% [markdown]

@@ -129,8 +129,8 @@ record.figure(fig, "map")
 #
 # $$a = \frac{\gamma\, v}{\Delta t}, \qquad\text{and has it if}\qquad \gamma \le \frac{a_{max}\,\Delta t}{v_{max}}.$$
 #
-# $v_{max}$: largest speed [m/s]; $\Delta t$: one step [s]. The dashed lines in the figure are this limit for one step
-# ahead. People who walk, and walls beside the robot, ask for a little more.
+# $v_{max}$: largest speed [m/s]; $\Delta t$: one step [s]. The dashed lines in the figure are this limit. It holds if the plan has barriers on two steps or more ($N_h \ge 2$, chapter 07). People who walk, and walls beside the robot,
+# ask for a little more.
 
 
 # %%
@@ -421,8 +421,9 @@ record.check(
 )
 
 # %% [markdown]
-# **People who walk** may come closer while the robot rests, and then step 2 fails. But the robot is safe until its
-# last plan ends, and by then it stands. So at the first moment with $h < 0$ the robot is at rest: *passive safety*.
+# **People who walk** may come closer while the robot rests; then step 2 fails, and a step may have no solution. A robot
+# that followed its old plan to the end would be at rest before $h < 0$, if people keep their velocity. szlib takes the
+# plan that violates least instead: it may move on, to get out of the way. So $h \ge 0$ is promised only among people who stand.
 #
 #
 # ## A promise without a terminal condition
@@ -620,17 +621,17 @@ failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]].rename(
 # | random command lines: odd names, places, values, numbers | 1,000 | none hangs, shows a foreign traceback, or changes other files |
 # | damaged results; disks full at each write; clocks that jump | 1,200; 23; 40 | all repaired or refused |
 # | `extract` and `run` killed at random moments | 100 | identical bytes after a restart, no process left |
-# | a search for worlds in which the robot touches a wall | 20,000 | no wall was touched; two broken claims are mended |
+# | a search for worlds in which the robot touches a wall | 20,000 | no wall was touched; it broke two claims of steps, which were then mended |
 
 # %% jupyter={"source_hidden": true}
 # What we know now
-Markdown(f"""**What we know now.** Towards a person who stands, a step has a solution as long as the robot can brake as fast
-as the barrier asks: $\\gamma \\le a_{{max}}\\Delta t / v_{{max}}$ = {settings.a_max * settings.dt / settings.v_max:g} for our robot, and
+Markdown(f"""**What we know now.** Towards a person who stands, with N_h of at least 2, a step has a solution as long as the robot can
+brake as fast as the barrier asks: $\\gamma \\le a_{{max}}\\Delta t / v_{{max}}$ = {settings.a_max * settings.dt / settings.v_max:g} for our robot, and
 we use {settings.gamma:g}. With one person and $\\gamma = 0.8$, h < 0 in {many} of the worlds, with
 {settings.gamma:g} in {few}: a small $\\gamma$ makes up for a short horizon, and the price is a slow
 robot. Where no plan obeys every row, walls come first, then bodies, zones, and eq. 1. A guard of one step has a proof: a
 robot that can stop never touches a wall, whatever people do. A plan that ends at rest has another: among people who stand,
-every later step has a solution; among people who walk, the robot is at rest when h becomes negative.""")
+every later step has a solution.""")
 
 # %% jupyter={"source_hidden": true}
 # Summary of the checks

@@ -64,7 +64,7 @@ from szlib.simulation.closed_loop import LoopSettings, drive
 from szlib.simulation.crowds import VisiblePeople
 from szlib.simulation.scenario import Variations
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
 
 record = NotebookRecord("26_meetings", globals(), plaza_zone=True)
 zone = record.cache.ellipse()
@@ -74,7 +74,7 @@ zone = record.cache.ellipse()
 size = "{:.2f} m x {:.2f} m".format(*zone.semi_axes)
 parameters(
     [
-        ("zone: semi-axes", size, PAPER, f"of chapter 06, at {record.cache.method.zone_speed:g} m/s"),
+        ("zone: semi-axes", size, MEASURED, f"of chapter 06, at {record.cache.method.zone_speed:g} m/s"),
         ("people's speed", "0.5 m/s", PAPER, "0.3 overtaken, 0.7 at the corner, 0.8 on the circle: assumed"),
         ("places and walls", "see the figure", ASSUMED, "the source draws them without numbers"),
         ("variations", variations, ASSUMED, "starts 0.2 m off in x and y, people 20 % slower or faster"),

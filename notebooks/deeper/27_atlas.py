@@ -80,16 +80,19 @@ usual = corridor[(corridor["pace"] == 0.5) & (corridor["size"] == 1)]
 fig, ax = plt.subplots(figsize=(8, 3.9), layout="constrained")
 plots.plot_strategies(usual, names=found, rows="gamma", columns="width", ax=ax)
 ax.set(xlabel="width of the corridor [m]", ylabel="gamma")
-has_no_plan = usual["strategy"].isin(["h < 0", "infeasible"]).groupby(usual["gamma"]).all()
-limit = has_no_plan.index[has_no_plan].min()
-ax.set_title(f"The wider the corridor, the less the robot yields; with gamma >= {limit:g} it has no plan")
+lacks_plans = usual["strategy"].isin(["h < 0", "infeasible"]).groupby(usual["gamma"]).all()
+limit = lacks_plans.index[lacks_plans].min()
+ax.set_title(
+    f"The wider the corridor, the less the robot yields; from gamma = {limit:g} on, steps lack a plan"
+)
 ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 record.figure(fig, "corridor-map")
 
 # %% [markdown]
 # This is the paper's corridor: a person comes at 0.5 m/s. Each cell is one run. Read it from below: with a small gamma
 # the robot gives way early, in a narrow corridor it *backs out*. With a larger gamma it *waits* for a shorter time, and then
-# it *goes ahead*. With a gamma of 0.1 or more it comes so near before it gives way that no plan is left.
+# it *goes ahead*. With a gamma of 0.1 or more it comes so near before it gives way that some steps have no
+# plan, even where it arrives.
 #
 # ## What a robot can do
 #
@@ -193,7 +196,9 @@ ax.set_xticks(by_gamma.index, [f"{value:g}" for value in by_gamma.index])
 ax.minorticks_off()
 ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 worst = by_gamma.min(axis=1, skipna=False)
-ax.set_title(f"gamma = {worst.idxmax():g} is the best of these: {worst.max():.0f} % or more in each scenario")
+ax.set_title(
+    f"gamma = {worst.idxmax():g} is the best in these narrow scenes: {worst.max():.0f} % or more in each"
+)
 record.figure(fig, "gamma")
 
 # %% [markdown]

@@ -115,7 +115,9 @@ Markdown(
 # ## The verdicts
 #
 # The share of a claim is that of all its conditions and zones together. Its interval is that of as many trials as there
-# are zones. The verdict follows from the interval alone:
+# are zones. Read both with care: we chose the conditions, and one more gamma changes the share; and 120 of the 160 zones are
+# draws from two recordings, so the interval is one for new draws, not for new places. The figure above shows each condition. The
+# verdict follows from the interval alone:
 #
 # | verdict | 95 % interval of the share |
 # |---|---|

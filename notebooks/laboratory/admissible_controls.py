@@ -21,8 +21,8 @@ from szlib.core.checks import Array
 from szlib.workbook import figures
 
 # Of the curves of limits: their reach, in half-widths of the box of accelerations, so that they cross it; the
-# number of their points, between which they are straight to 1e-3 m/s2; and the halvings that find them.
-_REACH, _POINTS, _BISECTIONS = 3, 49, 20
+# number of their points, between which they are straight to 1e-3 m/s2; and their precision [m/s2].
+_REACH, _POINTS, _PRECISION = 3, 49, 5e-4
 # Line styles of obstacles that stand still; after the last again from the first.
 _LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 
@@ -79,7 +79,8 @@ def find_admissible_controls(step: szlib.Step) -> AdmissibleControls:
     """
     s, u0, x = step.scene.settings, step.control, step.predicted
     free = shapely.box(-s.a_max, -s.a_max, s.a_max, s.a_max)
-    for velocity in x[1:, 2:]:
+    corner = np.abs(u0 - x[1:, 2:] / s.dt) + s.a_max  # from the centre of the disc to the farthest one
+    for velocity in x[1:, 2:][np.hypot(*corner.T) > s.v_max / s.dt]:
         disc = shapely.Point(u0 - velocity / s.dt).buffer(s.v_max / s.dt, quad_segs=256)
         free = free.intersection(disc)
     polygon, limits = free, []
@@ -98,29 +99,31 @@ def find_admissible_controls(step: szlib.Step) -> AdmissibleControls:
 def _find_edges(step: szlib.Step, i: int, keep: tuple[float, ...]) -> list[tuple[Array, Array]]:
     """The edge of each row of the obstacle `i`, and the direction to its allowed side."""
     s, u0, n = step.scene.settings, step.control, len(keep)
+    only = Obstacles.of(step.scene.barriers.items[i : i + 1], s)
     reach = _REACH * s.a_max
     nudges = 1e-3 * s.a_max * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
     at = np.broadcast_to(u0 + nudges, (n, 4, 2))
-    right, left, up, down = np.moveaxis(_find_residuals(step, i, keep, at), -1, 0)
+    right, left, up, down = np.moveaxis(_find_residuals(step, only, keep, at), -1, 0)
     inward = np.stack([right - left, up - down], axis=-1)
     steepest = np.hypot(inward[:, :1], inward[:, 1:])
     inward = np.where(steepest > 0, inward / np.where(steepest > 0, steepest, 1.0), (1.0, 0.0))
     across = np.stack([inward[:, 1], -inward[:, 0]], axis=-1)
     along = u0 + np.linspace(-reach, reach, _POINTS)[:, None] * across[:, None, :]
     low, high = np.full((n, _POINTS), -reach), np.full((n, _POINTS), reach)
-    for _ in range(_BISECTIONS):
+    farthest = along - reach * inward[:, None, :]
+    high = np.where(_find_residuals(step, only, keep, farthest) >= 0, low, high)  # far from the obstacle
+    while (high - low).max() > _PRECISION:
         middle = (low + high) / 2
         edges = along + middle[..., None] * inward[:, None, :]
-        obeys = _find_residuals(step, i, keep, edges) >= 0
+        obeys = _find_residuals(step, only, keep, edges) >= 0
         low, high = np.where(obeys, low, middle), np.where(obeys, middle, high)
     edges = along + high[..., None] * inward[:, None, :]
     return list(zip(edges, inward, strict=True))
 
 
-def _find_residuals(step: szlib.Step, i: int, keep: tuple[float, ...], first: Array) -> Array:
-    """Residuals of n rows of the obstacle `i` for other first controls, (n, m, 2) to (n, m)."""
+def _find_residuals(step: szlib.Step, only: Obstacles, keep: tuple[float, ...], first: Array) -> Array:
+    """Residuals of n rows of the one obstacle in `only` for other first controls, (n, m, 2) to (n, m)."""
     s, n = step.scene.settings, len(keep)
-    only = Obstacles.of(step.scene.barriers.items[i : i + 1], s)
     times = np.array(s.times[: n + 1])[:, None]
     moved, found = s.dt * np.maximum(times - s.dt / 2, 0)[..., None], list[Array]()
     for rows in (slice(n), slice(1, n + 1)):

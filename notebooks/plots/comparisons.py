@@ -27,7 +27,7 @@ from szlib.workbook.figures.style import (
 
 # Colour and hatching of each kind of safety violation.
 _BARS = {
-    "came": (BLACK, ""),
+    "appeared": (BLACK, ""),
     "turned": (RED, "///"),
     "slowed down": (GREEN, "..."),
     "sped up": (ORANGE, "xxx"),
@@ -371,7 +371,7 @@ def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import pandas as pd
     >>> import plots
-    >>> table = pd.DataFrame(1, index=["ETH"], columns=["came", "turned", "claimed_safe_steps"])
+    >>> table = pd.DataFrame(1, index=["ETH"], columns=["appeared", "turned", "claimed_safe_steps"])
     >>> ax = plots.plot_safety_claims(table)
     """
     ax = get_axes(ax, size=(8, 3.5))
@@ -384,7 +384,7 @@ def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
                 table.index,
                 share,
                 left=left,
-                label={"came": "appeared"}.get(kind, kind),
+                label=kind,
                 color=colour,
                 hatch=hatch,
                 edgecolor="white",

@@ -11,8 +11,8 @@ people ignore each other.  The real data is looked for in $SZLIB_DATA_DIR.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -106,35 +106,39 @@ def find_half(value: np.ndarray, seen: np.ndarray, expected: np.ndarray, n: np.n
     return float(np.interp(0.5, rising[around], x[around])) if above else 0.0
 
 
-def compare(data: pd.DataFrame, null: pd.DataFrame) -> Iterator[dict[str, object]]:
-    """One row a variable, a band of speeds: where people are half as frequent as by chance, with an interval."""
-    rng = np.random.default_rng(0)
-    sides = [describe_motion(each) for each in (data, null)]
-    for variable, bins in BINS.items():
-        middle = (bins[:-1] + bins[1:]) / 2
-        for band in BANDS:
-            chosen = [select(side, variable, band) for side in sides]
-            sizes = [int(side["pair"].max()) + 1 for side in sides]
-            n = np.histogram(chosen[1]["value"], bins)[0]
-            found = []
-            for k in range(1 + RESAMPLES):
-                drawn = [rng.multinomial(m, np.full(m, 1 / m)) if k else np.ones(m) for m in sizes]
-                counts = [count(*each) for each in zip(chosen, (bins, bins), drawn, strict=True)]
-                found.append(find_half(middle, *counts, n))
-            low, high = np.quantile(found[1:], [0.025, 0.975])  # NaN where one of them is
-            yield {
-                "variable": variable,
-                "slowest": band[0],
-                "fastest": band[1],
-                "pairs": chosen[0]["pair"].nunique(),
-                "half": found[0],
-                "half_low": low,
-                "half_high": high,
-            }
+def compare(sides: list[pd.DataFrame], variable: str, band: tuple[float, float]) -> dict[str, object]:
+    """A row: where people are half as frequent as by chance, with an interval.
+
+    Parameters
+    ----------
+    sides : the motion of the data, and of the null model, as of `describe_motion`.
+    variable : a key of `BINS`.
+    band : of speeds [m/s].
+    """
+    rng, bins = np.random.default_rng(0), BINS[variable]
+    middle = (bins[:-1] + bins[1:]) / 2
+    chosen = [select(side, variable, band) for side in sides]
+    sizes = [int(side["pair"].max()) + 1 for side in sides]
+    n = np.histogram(chosen[1]["value"], bins)[0]
+    found = []
+    for k in range(1 + RESAMPLES):
+        drawn = [rng.multinomial(m, np.full(m, 1 / m)) if k else np.ones(m) for m in sizes]
+        counts = [count(*each) for each in zip(chosen, (bins, bins), drawn, strict=True)]
+        found.append(find_half(middle, *counts, n))
+    low, high = np.quantile(found[1:], [0.025, 0.975])  # NaN where one of them is
+    return {
+        "variable": variable,
+        "slowest": band[0],
+        "fastest": band[1],
+        "pairs": chosen[0]["pair"].nunique(),
+        "half": found[0],
+        "half_low": low,
+        "half_high": high,
+    }
 
 
-def of_site(site: str) -> pd.DataFrame:
-    """The table of one site."""
+def load_sides(site: str) -> list[pd.DataFrame]:
+    """The motion of all pairs of a `site`, and of its null model."""
     if site == "crowd":
         tracks, area = noninteracting_crowd(seed=0, people=1500, minutes=30), szlib.ATC_SQUARE
     else:
@@ -142,9 +146,13 @@ def of_site(site: str) -> pd.DataFrame:
     options = {"area": area, "r_max": R_MAX}
     move = partial(szlib.null_pairs, tracks, shifts=SHIFTS[site], progress=False, **options)
     pairs = keep_out(move(seed=1).samples) if site == "circle" else szlib.find_pairs(tracks, **options)
-    table = pd.DataFrame(compare(pairs, move(seed=0).samples))
-    table.insert(0, "site", site)
-    return table
+    return [describe_motion(each) for each in (pairs, move(seed=0).samples)]
+
+
+def of_site(site: str) -> pd.DataFrame:
+    """The table of one site."""
+    sides = load_sides(site)
+    return pd.DataFrame({"site": site} | compare(sides, *row) for row in product(BINS, BANDS))
 
 
 def keep_out(pairs: pd.DataFrame) -> pd.DataFrame:
@@ -156,9 +164,7 @@ def keep_out(pairs: pd.DataFrame) -> pd.DataFrame:
 @study("06_collision", notebook="06")
 def recompute(row: pd.Series) -> dict[str, object]:
     """A row of the crowd, again."""
-    table = of_site("crowd")
-    same = (table["variable"] == row["variable"]) & (table["slowest"] == row["slowest"])
-    return table[same].iloc[0].to_dict()
+    return compare(load_sides("crowd"), row["variable"], (row["slowest"], row["fastest"]))
 
 
 if __name__ == "__main__":

@@ -53,6 +53,8 @@ PLAZA_KINDS = ("all", "strangers")
 DIRECTIONS = {"ahead": 0.0, "left": 90.0, "behind": -180.0, "right": -90.0}
 """Directions in which the reach of the respect zone is given [deg]."""
 POSTERIOR_DRAWS, DRAWS = 400, 30
+FAR = (0.5, 0.9)
+"""Nearest approaches from which on the test is made again [m]: beyond bodies, and beyond what a tracker of 2012 merges."""
 HULLS = 100_000
 """Samples of the null model whose hulls are found, at most: LOF is slow."""
 SIZES = (36, 72, 150, 300, 600, 1200, 2400, 4800)
@@ -218,7 +220,7 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
 def describe_site(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, float]:
     """Numbers of encounters, radii, p-values and sizes of hulls of one set of kinds."""
     test = szlib.null_test(data, null)
-    bodies = szlib.null_test(data, null, excluded_below=0.5)
+    beyond = {far: szlib.null_test(data, null, excluded_below=far) for far in FAR}
     few = max(1, min(null.shifts, HULLS * null.shifts // max(len(null.samples), 1)))
     by_shift = null.samples[null.samples["shift"] < few].groupby("shift")
     hulls = [hull_a(samples) for _, samples in by_shift]
@@ -232,7 +234,7 @@ def describe_site(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, f
         "careless_high": test.respect.careless_high,
         "null_radius_high": np.nanpercentile(null_radii(data, null), 97.5),
         "p_value": test.p_value,
-        "p_value_beyond_0.5m": bodies.p_value,
+        **{f"p_value_beyond_{far}m": found.p_value for far, found in beyond.items()},
         "hull_a": hull_a(data),
         "null_hull_a": np.nanmedian(hulls) if np.isfinite(hulls).any() else np.nan,
     }

@@ -21,7 +21,7 @@ from szlib.simulation.robot_run import Run
 # [rad].
 SAME_MOTION = 1e-6
 MOTION_CHANGES = (
-    "came", "turned", "slowed down", "sped up", "faced elsewhere", "kept their velocity", "wall",
+    "appeared", "turned", "slowed down", "sped up", "faced elsewhere", "kept their velocity", "wall",
 )  # fmt: skip
 """What people do during a step; see `safety_violations`."""
 
@@ -36,7 +36,7 @@ def safety_violations(run: Run) -> pd.DataFrame:
     h : h at that state [m].
     h_claimed : h if the person keeps their velocity and heading [m]; NaN for a person who was absent.
     deviation : distance of the person from the position at constant velocity [m].
-    change : "came": the person was absent before. "turned", "slowed down", "sped up": the greatest change of
+    change : "appeared": the person was absent before. "turned", "slowed down", "sped up": the greatest change of
         their velocity. "faced elsewhere": only the zone turned. "kept their velocity"; "wall".
     explained : True if the claim holds for the person as the controller was given them (h_claimed >= 0), or
         if there was no claim.
@@ -50,7 +50,7 @@ def safety_violations(run: Run) -> pd.DataFrame:
             continue
         before, after = run.people[k, i], run.people[k + 1, i]
         if np.isnan(before).any():
-            rows.append((t, i, h, np.nan, np.nan, "came", True))
+            rows.append((t, i, h, np.nan, np.nan, "appeared", True))
             continue
         expected = before[:2] + dt * before[3:]
         zone = run.zones[i].placed((float(expected[0]), float(expected[1])), float(before[2]))

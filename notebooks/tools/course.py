@@ -57,7 +57,7 @@ TASKS: list[tuple[str, tuple[str, ...]]] = [
 ]
 """Topic, and tasks of the exercise sheets, of each week; its chapters say so themselves."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [
-    ("The idea", ("06", "07", "10", "13")),
+    ("The idea", ("05", "06", "07", "09", "10", "13")),
     ("The method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "12")),
 ]
 """Shorter routes, by number of the notebook."""

@@ -17,7 +17,7 @@ floats, on NumPy arrays and on CasADi's symbols.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import IntEnum
 from itertools import groupby
 from math import cos, hypot, inf, sin
@@ -501,7 +501,7 @@ class HalfPlane(Obstacle):
         return (x - px) * nx + (y - py) * ny
 
 
-_PARTS = 16  # of a piece of a path, between whose ends distances are bounded
+_PARTS = 16  # of a piece of a path that is cut
 
 
 class Path(NamedTuple):
@@ -517,6 +517,16 @@ class Path(NamedTuple):
     points: Array
     times: Array
     bows: Array
+
+    def cut(self) -> Path:
+        """The same path, each piece cut into `_PARTS` of equal times."""
+        n = len(self.bows)
+        places = np.linspace(0.0, n, n * _PARTS + 1)
+        x, y, t = (
+            np.interp(places, np.arange(n + 1), each)
+            for each in (*self.points.T, self.times)
+        )
+        return Path(np.column_stack([x, y]), t, np.repeat(self.bows, _PARTS))
 
 
 class Bound(NamedTuple):
@@ -663,24 +673,27 @@ class Obstacles(NamedTuple):
 
         Notes
         -----
-        Each piece of the path is cut into `_PARTS`. Within one, no distance changes by more than the robot
-        and the obstacle move, so it is nowhere less than half of the sum of both ends less that way. The
-        robot leaves a uniform motion by at most the bow.
+        Within a piece of the path no distance changes by more than the robot and the obstacle move, so it is
+        nowhere less than half of the sum of both ends less that way. The robot leaves a uniform motion by at
+        most the bow. Where this bound is negative, the pieces are cut (`Path.cut`), which raises it.
         """
         if not self.groups:
             return Bound()
-        n = len(path.bows)
-        parts = np.linspace(0.0, n, n * _PARTS + 1)
-        x, y, t = (
-            np.interp(parts, np.arange(n + 1), each)
-            for each in (*path.points.T, path.times)
-        )
-        gaps = (self.h if is_barrier else self.gaps)(x, y, t)
-        moved = self.speeds[:, None] * np.diff(t)
-        reach = np.hypot(np.diff(x), np.diff(y)) + moved
-        bows = np.repeat(path.bows, _PARTS)
-        lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - bows
-        return Bound(lower.min(), gaps[:, _PARTS::_PARTS].min())
+        measure = self.h if is_barrier else self.gaps
+        bound = self._bound_pieces(path, measure)
+        if bound.is_safe:
+            return bound
+        return bound._replace(lower=self._bound_pieces(path.cut(), measure).lower)
+
+    def _bound_pieces(self, path: Path, measure: Callable[..., Array]) -> Bound:
+        """The `bound` of a path whose pieces are not cut; `measure` gives the gaps."""
+        points = path.points
+        times = path.times
+        gaps = measure(*points.T, times)
+        moved = self.speeds[:, None] * (times[1:] - times[:-1])
+        reach = np.hypot(*(points[1:] - points[:-1]).T) + moved
+        lower = (gaps[:, 1:] + gaps[:, :-1] - reach) / 2 - path.bows
+        return Bound(lower.min(), gaps[:, 1:].min())
 
     def find_travel(self, x: Array, y: Array, t: Any, body_gap: float) -> Array:
         """How far a robot must move at least until it violates a floor of each obstacle, shape (n, k) [m].

@@ -202,21 +202,24 @@ class Step:
     def residual(self) -> Array:
         """h_{k+1} - (1-gamma)^m h_k for each step of m dt of the plan, shape (obstacles, N_h) [m]."""
         s = self.asked.settings
-        n = s.N_h + 1
-        x, y, *_ = self.planned[:n].T
-        h = self.asked.barriers.h(x, y, s.times[:n])
+        h = self._planned_h[:, : s.N_h + 1]
         keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h])
         return np.asarray(h[:, 1:] - keep * h[:, :-1])
+
+    @cached_property
+    def _planned_h(self) -> Array:
+        """Barriers at the states of the plan, shape (obstacles, N+1) [m]."""
+        x, y, *_ = self.planned.T
+        return self.asked.barriers.h(x, y, self.asked.settings.times)
 
     @cached_property
     def _rows(self) -> list[Rows]:
         """The rows of every level at the states of the plan."""
         scene = self.asked
-        x = self.planned
         s = scene.settings
-        at = (*x.T[:2], s.times)
-        bodies = find_bodies(scene.zones, s, as_predicted=True)
-        return list(list_rows(scene, x, scene.barriers.h(*at), bodies.h(*at)))
+        x, y, *_ = self.planned.T
+        bodies = find_bodies(scene.zones, s, as_predicted=True).h(x, y, s.times)
+        return list(list_rows(scene, self.planned, self._planned_h, bodies))
 
     @cached_property
     def violations(self) -> dict[Priority, float]:

@@ -2,8 +2,9 @@
 
 A claim is judged in many conditions: with each zone that was drawn, each controller or chain of methods, in
 each scenario. Its *share* is that of conditions and draws in which it holds. Zones are drawn at random,
-conditions are not. So the 95 % interval of the share is that of Clopper and Pearson for as many trials as
-there are zones. That is cautious: a zone that holds in a part of the conditions varies less than a trial.
+conditions are not: the share is that of the conditions which were tried. The 95 % interval of the share is
+that of Clopper and Pearson for as many trials as there are zones. Zones that were drawn from one recording
+depend on each other, so it is an interval for new draws, not for new places.
 
     supported                   the interval lies at or above 90 %
     mostly supported            it lies above one half

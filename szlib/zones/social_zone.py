@@ -306,7 +306,7 @@ class SocialZone:
     def meaning(self) -> str:
         """What the zone is, and what its intervals are of, in one line."""
         if self.method == "respect":
-            return "respect: the zone that people keep; it lies in the intervals with a probability of 95 %"
+            return "respect: the zone that people keep, with 95 % intervals"
         return (
             f"{self.method}: where (nearly) nobody was; the 95 % intervals are of that with everybody "
             "there is, so a hull of few can lie above them; they are not of the zone that people keep"

@@ -1,5 +1,7 @@
 """The study of distance and time to collision: motion against a small simulation, and known ratios."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -69,7 +71,12 @@ def test_a_circle_that_nobody_enters_is_found_at_the_nearest_approach():
         }
     )
     samples = samples[samples["distance"] < collision.R_MAX]
-    table = pd.DataFrame(collision.compare(collision.keep_out(samples), samples))
+    sides = [
+        collision.describe_motion(each)
+        for each in (collision.keep_out(samples), samples)
+    ]
+    rows = product(collision.BINS, collision.BANDS)
+    table = pd.DataFrame(collision.compare(sides, *row) for row in rows)
     half = table.set_index(["variable", "slowest"])["half"]
     assert half["nearest approach", 1.1] == pytest.approx(collision.CIRCLE, abs=0.05)
     assert half["distance", 1.7] > half["distance", 0.5] > collision.CIRCLE - 0.05

@@ -151,7 +151,7 @@ def test_false_safety_claims_are_found():
         ((0.9, 0.0), (0.0, 0.0), 1.0, "slowed down"),
         ((0.5, 0.0), (0.5, 0.0), 1.0, "faced elsewhere"),
         ((0.5, 0.0), (0.5, 0.0), 2 * np.pi, "kept their velocity"),
-        ((np.nan, np.nan), (0.5, 0.0), 0.0, "came"),
+        ((np.nan, np.nan), (0.5, 0.0), 0.0, "appeared"),
     ],
 )
 def test_the_change_of_motion_is_classified(given, walked, turned, did):
@@ -163,11 +163,11 @@ def test_the_change_of_motion_is_classified(given, walked, turned, did):
     at = log.states[1, :2] + (0.5, 0.0)
     before = np.array([*(at - 0.1 * np.array(walked)), 0.0, *given])
     people = np.array(
-        [before * (np.nan if did == "came" else 1.0), [*at, turned, *walked]]
+        [before * (np.nan if did == "appeared" else 1.0), [*at, turned, *walked]]
     )
     (row,) = safety_violations(replace(log, people=people[:, None])).to_dict("records")
     assert (row["change"], row["t"], row["person"]) == (did, 0.1, 0)
-    if did != "came":
+    if did != "appeared":
         assert row["deviation"] == pytest.approx(
             0.1 * np.hypot(*np.subtract(walked, given))
         )

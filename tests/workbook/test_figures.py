@@ -526,7 +526,7 @@ def test_safety_violations_are_shares_of_the_steps_claimed_safe():
     table = pd.DataFrame(
         0, index=["orca", "ETH"], columns=[*MOTION_CHANGES, "claimed_safe_steps"]
     )
-    table["claimed_safe_steps"], table["turned"], table["came"] = (
+    table["claimed_safe_steps"], table["turned"], table["appeared"] = (
         [1000, 500],
         [3, 0],
         [0, 1],
