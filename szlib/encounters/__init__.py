@@ -24,8 +24,24 @@ from .sensor import SensorCheck
 from .settings import EncounterSettings
 
 __all__ = [
-    "ATC_SQUARE", "KINDS", "PAPER_SPACE", "SAMPLE_COLUMNS", "Area", "AttentionalSpace", "EncounterSettings",
-    "Extraction", "NullEncounters", "SensorCheck", "Square", "as_area",
-    "extract_days", "find_encounters", "find_pairs", "null_encounters", "null_pairs", "of_kind",
-    "time_shifted", "walked_area",
-]  # fmt: skip
+    "ATC_SQUARE",
+    "KINDS",
+    "PAPER_SPACE",
+    "SAMPLE_COLUMNS",
+    "Area",
+    "AttentionalSpace",
+    "EncounterSettings",
+    "Extraction",
+    "NullEncounters",
+    "SensorCheck",
+    "Square",
+    "as_area",
+    "extract_days",
+    "find_encounters",
+    "find_pairs",
+    "null_encounters",
+    "null_pairs",
+    "of_kind",
+    "time_shifted",
+    "walked_area",
+]

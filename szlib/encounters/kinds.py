@@ -36,8 +36,12 @@ from ..tracks.clock import TICKS_PER_SECOND
 from .occupants import TrackRows, find_neighbours, spans
 
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
-    "companions", "standing", "same direction", "opposite", "crossing",
-)  # fmt: skip
+    "companions",
+    "standing",
+    "same direction",
+    "opposite",
+    "crossing",
+)
 STRANGERS = "strangers"  # all kinds but companions
 
 # The common track reaches this far beyond the area [m] (measured: it finds all 62 pairs of the real day that

@@ -14,9 +14,17 @@ from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, clock_index
 from .geometry import Area, AttentionalSpace, wrap_angle
 
 SAMPLE_COLUMNS = [
-    "encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed", "other_los_angle",
+    "encounter",
+    "day",
+    "ref_id",
+    "other_id",
+    "t",
+    "los_angle",
+    "distance",
+    "speed",
+    "other_los_angle",
     "other_speed",
-]  # fmt: skip
+]
 """Columns of a table of samples; the column kind follows them."""
 _AT_ONCE = 500_000  # rows searched at a time
 

@@ -14,6 +14,12 @@ from .settings import (
 )
 
 __all__ = [
-    "ANY_SPEED_INTRUDERS", "RUSHING_INTRUDERS", "SLOW_INTRUDERS", "PlazaSettings",
-    "make_plaza", "positions", "precision_and_recall", "stage_encounters",
-]  # fmt: skip
+    "ANY_SPEED_INTRUDERS",
+    "RUSHING_INTRUDERS",
+    "SLOW_INTRUDERS",
+    "PlazaSettings",
+    "make_plaza",
+    "positions",
+    "precision_and_recall",
+    "stage_encounters",
+]

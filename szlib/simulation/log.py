@@ -30,9 +30,17 @@ if TYPE_CHECKING:
 _FORMAT = "szlib.SimulationLog"
 _VERSION = 8
 _ARRAYS = (
-    "states", "controls", "people", "predicted", "residual", "status", "safe", "slack", "solve_time",
+    "states",
+    "controls",
+    "people",
+    "predicted",
+    "residual",
+    "status",
+    "safe",
+    "slack",
+    "solve_time",
     "stuck",
-)  # fmt: skip
+)
 _SHOWN = (
     "success",
     "outcome",

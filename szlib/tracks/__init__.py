@@ -17,6 +17,11 @@ from .readers import read_raw
 from .recipe import Recipe
 
 __all__ = [
-    "Recipe", "clock_index", "datasets", "funnels", "read_raw",
-    "read_tracks", "to_clock",
-]  # fmt: skip
+    "Recipe",
+    "clock_index",
+    "datasets",
+    "funnels",
+    "read_raw",
+    "read_tracks",
+    "to_clock",
+]

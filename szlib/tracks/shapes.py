@@ -315,11 +315,13 @@ def _parse_nuscenes(file: File) -> ParsedFile:
 
 
 PARSERS: dict[str, Callable[[File], ParsedFile]] = {
-    "ewap": _parse_ewap, "trajnet": _parse_trajnet,
+    "ewap": _parse_ewap,
+    "trajnet": _parse_trajnet,
     "magni": lambda file: (read_magni_rows(file.path, file.plain), {}),
-    "wide": _parse_wide, "level_x": _parse_level_x,
+    "wide": _parse_wide,
+    "level_x": _parse_level_x,
     "nuscenes": _parse_nuscenes,
-}  # fmt: skip
+}
 
 
 def _load_by_pedpy(loader: str, file: File) -> ParsedFile:

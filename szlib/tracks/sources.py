@@ -250,9 +250,12 @@ def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> 
     where = file.path
     lines = pl.read_csv(
         io.BytesIO(file.text().replace("\x1f", "?").encode()),
-        has_header=False, separator="\x1f", quote_char=None,
-        schema={"line": String}, raise_if_empty=False,
-    )["line"]  # fmt: skip
+        has_header=False,
+        separator="\x1f",
+        quote_char=None,
+        schema={"line": String},
+        raise_if_empty=False,
+    )["line"]
     first = str(lines.first() or "").strip()
     if not first:
         raise DataError(
@@ -321,10 +324,20 @@ def scan_streamed(file: File) -> Rows | None:
     schema = {f"f{k}": types.get(k, String) for k in range(shape.n_fields)}
     content = file.plain if file.size is None else io.StringIO(file.text())
     scan = pl.scan_csv(
-        content, schema={**schema, "extra": String()}, has_header=False, quote_char=None,
-        encoding="utf8-lossy", ignore_errors=True, truncate_ragged_lines=True, missing_columns="insert",
-        extra_columns="ignore", raise_if_empty=False, glob=False, row_index_name="line", row_index_offset=1,
-    )  # fmt: skip
+        content,
+        schema={**schema, "extra": String()},
+        has_header=False,
+        quote_char=None,
+        encoding="utf8-lossy",
+        ignore_errors=True,
+        truncate_ragged_lines=True,
+        missing_columns="insert",
+        extra_columns="ignore",
+        raise_if_empty=False,
+        glob=False,
+        row_index_name="line",
+        row_index_offset=1,
+    )
     ragged = col("extra").is_not_null() | col(f"f{shape.n_fields - 1}").is_null()
     values = {name: col(f"f{at}") for name, at in recipe.columns.items()}
     metres = col("^(x|y|speed)$") * recipe.metres

@@ -277,9 +277,14 @@ def _extract(options: argparse.Namespace) -> int:
 
     with cluster(options.scheduler, wait=options.wait):
         extraction = extract_days(
-            options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude,
-            recipe=_read_options(options, options.data), area=options.area, has_walls=options.walls,
-        )  # fmt: skip
+            options.data,
+            out=options.out,
+            n_jobs=options.jobs,
+            exclude=options.exclude,
+            recipe=_read_options(options, options.data),
+            area=options.area,
+            has_walls=options.walls,
+        )
     print(extraction)
     return 1 if len(extraction.failed) else 0
 

@@ -34,18 +34,32 @@ from .record.parameters import METHOD_DEFAULTS, read_defaults
 
 # Errors caused by data, disk or memory, not by the notebook.
 REFUSED = {
-    "DataError", "StorageError", "MemoryLimitError", "ZoneError", "SolverError", "SzlibError", "MemoryError",
-    "OSError", "PermissionError", "FileNotFoundError", "IsADirectoryError", "NotADirectoryError",
+    "DataError",
+    "StorageError",
+    "MemoryLimitError",
+    "ZoneError",
+    "SolverError",
+    "SzlibError",
+    "MemoryError",
+    "OSError",
+    "PermissionError",
+    "FileNotFoundError",
+    "IsADirectoryError",
+    "NotADirectoryError",
     "DeadKernelError",
-}  # fmt: skip
+}
 INLINE = "module://matplotlib_inline.backend_inline"  # the backend that shows figures in a notebook
 # of temporary files [characters]: in a longer one the server of forks has no room for its socket
 _LONGEST_FOLDER = 70
 # Nothing of it imports polars, whose threads a fork does not survive.
 PRELOADED = [
-    "ipykernel.kernelapp", "matplotlib.pyplot", "sklearn.neighbors", "pandas.io.formats.style",
-    "szlib.control.mpc", "szlib.simulation.monte_carlo",
-]  # fmt: skip
+    "ipykernel.kernelapp",
+    "matplotlib.pyplot",
+    "sklearn.neighbors",
+    "pandas.io.formats.style",
+    "szlib.control.mpc",
+    "szlib.simulation.monte_carlo",
+]
 # The record of a notebook that wrote none.
 EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 
@@ -186,11 +200,15 @@ class ForkingProvisioner(LocalProvisioner):
         pid = cast(int, process.pid)
         streams = dict.fromkeys(("stdin", "stdout", "stderr"))
         self.process = SimpleNamespace(  # type: ignore[assignment]
-            poll=lambda: process.exitcode, wait=process.join, kill=process.kill,
-            terminate=process.terminate, pid=pid, **streams,
+            poll=lambda: process.exitcode,
+            wait=process.join,
+            kill=process.kill,
+            terminate=process.terminate,
+            pid=pid,
+            **streams,
             # used where the group of the process has gone, as of a kernel that has just died
             send_signal=lambda number: os.kill(pid, number),
-        )  # fmt: skip
+        )
         self.pid = self.pgid = pid  # it leads a session of its own
         return self.connection_info
 

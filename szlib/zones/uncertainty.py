@@ -41,8 +41,15 @@ from .outliers import encounter_numbers, pair_numbers
 
 # Sides of the reference pedestrian, 45 deg each.
 SIDES = (
-    "ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right"
-)  # fmt: skip
+    "ahead",
+    "ahead left",
+    "left",
+    "behind left",
+    "behind",
+    "behind right",
+    "right",
+    "ahead right",
+)
 # Encounters of reference pedestrians up to this much slower or faster are pooled [m/s] (assumed).
 SPEED_BAND = 0.2
 MIN_ENCOUNTERS = 20  # encounters needed on each side: a share of 5 % of fewer is less than one (assumed)

@@ -26,7 +26,20 @@ from .style import (
 from .zones import plot_zone, plot_zones
 
 __all__ = [
-    "BLACK", "BLUE", "GREEN", "GREY", "ORANGE", "RED", "add_legend_below",
-    "add_shared_legend", "alt_text", "animate", "get_axes", "label_metres",
-    "pick_colours", "plot_scenario", "plot_zone", "plot_zones",
-]  # fmt: skip
+    "BLACK",
+    "BLUE",
+    "GREEN",
+    "GREY",
+    "ORANGE",
+    "RED",
+    "add_legend_below",
+    "add_shared_legend",
+    "alt_text",
+    "animate",
+    "get_axes",
+    "label_metres",
+    "pick_colours",
+    "plot_scenario",
+    "plot_zone",
+    "plot_zones",
+]

@@ -130,9 +130,14 @@ class Movie(bytes):
         movie = super().__new__(cls, gif)
         n = len(run.zones)
         columns = (
-            run.time.tolist(), run.states, run.people, run.predicted, run.h, run.status,
+            run.time.tolist(),
+            run.states,
+            run.people,
+            run.predicted,
+            run.h,
+            run.status,
             run.stuck.tolist(),
-        )  # fmt: skip
+        )
         movie.run = {
             "layout": scene_layout(run.scenario, run.settings, limits),
             "snapshots": [

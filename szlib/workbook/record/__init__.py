@@ -12,6 +12,15 @@ from .notebook_record import TABLES, NotebookRecord, read_table
 from .parameters import ZoneMethod
 
 __all__ = [
-    "ASSUMED", "CHOSEN", "MEASURED", "PAPER", "TABLES", "TUNED", "DataCache",
-    "NotebookRecord", "ZoneMethod", "parameters", "read_table",
-]  # fmt: skip
+    "ASSUMED",
+    "CHOSEN",
+    "MEASURED",
+    "PAPER",
+    "TABLES",
+    "TUNED",
+    "DataCache",
+    "NotebookRecord",
+    "ZoneMethod",
+    "parameters",
+    "read_table",
+]

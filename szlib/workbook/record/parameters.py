@@ -28,12 +28,24 @@ SETTINGS = {"gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
 _LARGEST = 2**31
 # Lowest and highest value of a parameter that is not a setting of the controller.
 RANGES: dict[str, tuple[float, float]] = {
-    "seed": (0, 2**63), "space_width": (0.1, 100), "space_length": (0.1, 100), "duration": (0.1, 60),
-    "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "zone_speed": (0.01, 10),
-    "intruders": (0, 0.5), "examples": (1, _LARGEST), "worlds": (1, _LARGEST), "n_jobs": (-1, _LARGEST),
-    "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
+    "seed": (0, 2**63),
+    "space_width": (0.1, 100),
+    "space_length": (0.1, 100),
+    "duration": (0.1, 60),
+    "min_distance": (0, 100),
+    "min_speed": (0.01, 10),
+    "q": (0.001, 0.5),
+    "zone_speed": (0.01, 10),
+    "intruders": (0, 0.5),
+    "examples": (1, _LARGEST),
+    "worlds": (1, _LARGEST),
+    "n_jobs": (-1, _LARGEST),
+    "fraction": (1e-6, 0.5),
+    "r_max": (0.01, 100),
+    "speeds": (0.01, 10),
+    "lengths": (1e-3, 1e4),
     "eccentricities": (0, 0.999999),
-}  # fmt: skip
+}
 # Parameters that no check depends on: the data, the way of computing, and the amount shown.
 NEUTRAL = {*OPTIONS, "area", "reading", "n_jobs", "examples"}
 
