@@ -139,7 +139,6 @@ class MPCCBF(Controller):
     >>> ax, ay = step.control  # the acceleration to apply for the next 0.1 s
     """
 
-    settings: MPCSettings
     zone: Ellipse
 
     def __init__(
@@ -151,7 +150,7 @@ class MPCCBF(Controller):
         settings: MPCSettings | None = None,
         tracker: Tracker | None = None,
     ) -> None:
-        self.settings = settings or MPCSettings()
+        self._settings = MPCSettings() if settings is None else settings
         is_one = isinstance(self.settings, MPCSettings)
         expected = "MPCSettings, such as MPCSettings.among_people()"
         check_argument(is_one, "settings", settings, expected)
@@ -163,6 +162,11 @@ class MPCCBF(Controller):
         self._take_walls(walls)
         self._take_obstacles(obstacles)
         self.reset()
+
+    @property
+    def settings(self) -> MPCSettings:  # type: ignore[override]
+        """The settings; build another controller for others."""
+        return self._settings
 
     @property
     def walls(self) -> Array:
@@ -186,13 +190,17 @@ class MPCCBF(Controller):
 
     def _take_walls(self, walls: Any) -> None:
         self._segments, self._solids = read_walls(walls), find_solids(walls)
+        self._segments.flags.writeable = False
 
     def _take_obstacles(self, obstacles: Iterable[Obstacle]) -> None:
         """Build what is fixed, of the walls and these `obstacles`."""
+        is_list = isinstance(obstacles, Iterable)
+        check_argument(is_list, "obstacles", obstacles, "a list of obstacles")
         others = tuple(obstacles)
         for each in others:
             is_one = isinstance(each, Obstacle)
             check_argument(is_one, "an obstacle", each, "an Obstacle")
+            each.check()
         self._obstacles = others
         ends = self._segments.reshape(-1, 4).tolist()
         items = [*(Wall(*each) for each in ends), *others]

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.checks import Array, check_array, check_point
+from ..core.errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .settings import TOLERANCE, MPCSettings, check_argument
 
@@ -204,6 +205,7 @@ class Obstacle:
     ----------
     kind : name of the class in logs and explanations, such as "wall"; by default that of the class.
     priority : which violation is worse, if the robot cannot avoid all; what has that of a wall stands still.
+        The guard, and `Step.passively_safe`, look at walls and at bodies of people, at no other `BODY`.
 
     Notes
     -----
@@ -246,6 +248,16 @@ class Obstacle:
         given = check_array(f"the numbers of a {self.kind}", numbers, (len(numbers),))
         self.numbers = tuple(given.tolist())
 
+    def check(self) -> None:
+        """Raise SolverError if `distance` cannot be computed for many places at once."""
+        try:
+            self.distance(*np.ones((3, 2)), *self.numbers)
+        except (TypeError, ValueError, NotImplementedError) as error:
+            raise SolverError(
+                f"{self}: `distance` must be a formula of x, y, t and {len(self.numbers)} numbers, by "
+                f"operators only: {error!r}"
+            ) from error
+
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:
         """Distance of (`x`, `y`) to the obstacle, `t` seconds from now [m]; operators only.
@@ -274,7 +286,7 @@ class Obstacle:
     def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
         """Boxes that hold all places nearer to obstacles than `offsets`: corners, shape (n, 2) each [m].
 
-        By default everywhere: then a map of ways measures each of its cells.
+        By default everywhere: then a map of ways measures each cell, and ends 8 m from robot and goal.
 
         Parameters
         ----------

@@ -363,7 +363,7 @@ class Step:
             "zone_price=inf": s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
-            "v_max": not self.passively_safe,
+            "v_max": self.walls_safe and not self.passively_safe,
             f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one": self.timed_out,
             f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
             "helps: another goal": self.asked.goal_blocked,
@@ -396,7 +396,7 @@ class Step:
     def _advise(self, row: Row) -> str:
         s = self.scene.settings
         if (self.h < -TOLERANCE).any():
-            return "nothing now, because the robot is already too close; the plan leads out again"
+            return "nothing now: the robot is already too close, and the plan leads out where it can"
         if row.kind == "speed":
             return f"start at v_max = {s.v_max:g} m/s or slower, or raise v_max"
         if row.kind == "end":

@@ -21,8 +21,9 @@ from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .obstacles import PaperWall, Priority, Wall, Zone
 from .settings import TOLERANCE, MPCSettings
 
-# Two computations of one number may differ by this much, relative to the largest number (at least 1).
+# Two computations of one number may differ by this much, or by a share of the largest number.
 ROUNDING = 1e-7
+_RELATIVE = 1e-12
 PIECES = 16  # of a step, at whose ends gaps are computed
 _SAMPLES = PIECES + 1
 _MOST_PIECES = 1000  # of a braking path
@@ -170,7 +171,8 @@ def verify_step(step: Any) -> Report:
     ]
     if step.of_point is None:
         compared.append(("control differs", step.control, step.inputs[0]))
-    tolerance = ROUNDING * max(1.0, np.abs(x).max(), np.abs(h).max(initial=0.0))
+    largest = max(np.abs(x).max(), np.abs(h).max(initial=0.0))
+    tolerance = max(ROUNDING, _RELATIVE * largest)
     faults = []
     for name, found, given in compared:
         error = np.abs(found - given).max(initial=0.0)

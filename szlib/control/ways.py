@@ -40,6 +40,8 @@ from .settings import MPCSettings
 Cells = NDArray[np.intp]
 CELL = 0.15
 """Side of a cell [m] (assumed)."""
+SMALLEST_CELL = 0.06
+"""Side of a cell of a small robot [m] (assumed): smaller ones take too long to search."""
 MOST_CELLS = 250_000
 """About the greatest number of cells of a map; those of a large one are larger (assumed)."""
 SEARCH_RADIUS = 4.0
@@ -170,7 +172,7 @@ class Map:
         self._middle = (low + high) / 2
         size = high - low
         self._reach = size / 2
-        side = min(CELL, clearance / _MOST_SHARE)
+        side = min(CELL, max(SMALLEST_CELL, clearance / _MOST_SHARE))
         # so that MOST_CELLS = (size[0] / cell + 2 _MARGIN) (size[1] / cell + 2 _MARGIN)
         most = MOST_CELLS - 4 * _MARGIN**2
         half = _MARGIN * size.sum() / most
@@ -181,7 +183,8 @@ class Map:
         covered = self._cover(fixed, slack * self.cell)[2:-2, 2:-2]
         self.free = np.pad(~covered | covered.all(), 2)
         self.blocked = ~self.free
-        wide = distance_transform_edt(self.free) * self.cell >= _DOOR
+        open_ = np.pad(~covered, 2, constant_values=True)  # beyond the map as well
+        wide = distance_transform_edt(open_) * self.cell >= _DOOR
         self.is_narrow = self.free & (distance_transform_edt(~wide) * self.cell > _DOOR)
         self._parts, _ = label(self.free, np.ones((3, 3)))
         # pairs of free neighbours, in 16 directions
@@ -291,6 +294,7 @@ class WayFinder:
         self._fixed = fixed
         self._s = settings
         self._map: Map | None = None
+        self._is_loose = False
         self.reset()
 
     def reset(self) -> None:
@@ -300,6 +304,7 @@ class WayFinder:
         self._steps = 0
         self._n_people = 0
         self._standing: Any = None
+        self._measured = self._goal
 
     def find(
         self, at: Point, goal: Point, people: Sequence[Person], zones: Obstacles
@@ -308,6 +313,8 @@ class WayFinder:
         if dist(goal, self._goal) > _GOAL_MOVED:
             self.reset()
             self._goal = goal
+            if self._is_loose:
+                self._map = None
         m = self._get_map(at, goal)
         is_searched = not self._steps or len(people) != self._n_people
         if is_searched:
@@ -344,10 +351,18 @@ class WayFinder:
     def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
         """Find the ways anew, and choose one."""
         standing = np.round(near.places[near.stands, 0] / _MOVED).ravel().tolist()
-        if standing != self._standing or not m.is_near[*near.start]:
+        if (
+            standing != self._standing
+            or not m.is_near[*near.start]
+            or self._is_elsewhere(m, goal)
+        ):
             (price,) = near.find_prices(near.stands, np.zeros(1), 0, m.shape)
             m.measure(at, goal, self._s.v_max, price)
             self._standing = standing
+            self._measured = goal
+            m.is_reached &= not self._is_loose or self._fits(
+                m.descend(near.start)[1:], m.cell
+            )
         if m.is_reached:
             m.end = np.array(goal)  # it may have moved a little
         before = np.array(inf)
@@ -360,6 +375,20 @@ class WayFinder:
             gain = SWITCH_GAIN * (np.abs(turns - before) <= pi).all()
             found.append((way.cost - gain, way))
         self._ways = [way for _, way in sorted(found, key=lambda pair: pair[0])]
+
+    def _is_elsewhere(self, m: Map, goal: Point) -> bool:
+        """True if the times of the map `m` are not those to the `goal`: it moved out of sight."""
+        is_in_sight = m.is_reached and m.sees(m.end, np.array([goal]))[0]
+        return goal != self._measured and not is_in_sight
+
+    def _fits(self, way: Array, cell: float) -> bool:
+        """True if h >= 0 somewhere in each `cell` of a `way`."""
+        h = self._fixed.h(*way.T)
+        near = self._fixed.select_near(h.min(axis=1, initial=inf) - cell)
+        tight = way[(h < 0).any(axis=0)]
+        x, y = cell * np.mgrid[-0.5:0.5:9j, -0.5:0.5:9j].reshape(2, -1, 1)
+        least = near.h(tight[:, 0] + x, tight[:, 1] + y).min(axis=0, initial=inf)
+        return bool((least.max(axis=0) >= 0).all())
 
     def _find_ways(
         self, m: Map, at: Point, near: Surroundings

@@ -493,10 +493,9 @@ def _fit_ellipses(
         except ZoneError as error:
             undefined[speed] = str(error)
     if not ellipses:
-        reasons = "; ".join(undefined.values())
-        median = samples["speed"].median()
         raise ZoneError(
-            f"no speed has a zone: {reasons}; half of the samples are slower than {median:.1f} m/s: "
+            f"no speed has a zone: {'; '.join(undefined.values())}; half of the samples are slower than "
+            f"{samples['speed'].median():.1f} m/s: "
             "choose a speed near that, or add data"
         )
     return ellipses, undefined
