@@ -146,9 +146,9 @@ def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
         ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows"
     )
     row, columns, n_covered = _on_clock(t, raw[["x", "y"]].to_numpy(float).T, within)
-    people = raw["day"].astype("category").array.take(row), raw["id"].to_numpy()[row]
-    named = dict(zip(COLUMNS, [*people, *columns], strict=True))
-    table = pd.DataFrame(named, copy=False)
+    day = raw["day"].astype("category").array.take(row)
+    columns = [day, raw["id"].to_numpy()[row], *columns]
+    table = pd.DataFrame(dict(zip(COLUMNS, columns, strict=True)), copy=False)
     n_lost = len(t) - n_covered
     if n_lost > _MOST_LOST * len(t) + _FEW:
         raise DataError(
@@ -159,7 +159,9 @@ def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
     rejected = {"in a gap-free piece that covers no tick": n_lost}
     stage = funnels.stage("clock: samples", len(t), n_covered, rejected)
-    stage["interval"] = seconds / max(1, int(within.sum()))
+    n_steps = int(within.sum())
+    stage["interval"] = seconds / max(1, n_steps)
+    stage["positions"] = len(t) / max(1, len(t) - n_steps)
     return funnels.attach(table, [*funnels.get(raw), stage])
 
 

@@ -39,6 +39,8 @@ _ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
 _EXCEL_1970 = 25_569  # number of the day 1970-01-01 in Excel
 _DROPPED_BITS = 11  # bits of a hash that are left out: a float holds the others exactly
 _LARGEST_EXACT = 2.0**53  # floats hold smaller whole numbers exactly
+_NO_IDS = "", "nan", "none", "null", "na"  # what programs write for nobody
+_FARTHEST_ORIGIN = 0.5  # from the middle of the positions [degrees]
 
 
 def open_source(file: File) -> tuple[Source, Recipe]:
@@ -60,9 +62,9 @@ def open_source(file: File) -> tuple[Source, Recipe]:
             find_columns(table, recipe)
             readable.append(table)
     if len(readable) > 1:
-        command = f"sqlite3 -header -csv {path.name} 'SELECT * FROM NAME' > tracks.csv"
         raise DataError(
-            f"{path}: several of the {len(tables)} tables can be tracks; write one to a file: {command}"
+            f"{path}: several of the {len(tables)} tables can be tracks; write one to a file: "
+            f"sqlite3 -header -csv {path.name} 'SELECT * FROM NAME' > tracks.csv"
         )
     if head.startswith(CONTAINERS):
         source = open_arrow(file)
@@ -103,9 +105,7 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
         t = numbers.pop("frame") * (1 / (recipe.frame_rate or 1.0))
         day = None
     else:
-        tz = recipe.tz or "UTC"
-        unit = recipe.time_unit
-        t, day = to_times(values["t"], tz, unit, decimal)
+        t, day = to_times(values["t"], recipe.tz or "UTC", recipe.time_unit, decimal)
     table = pl.DataFrame({"t": t, "id": to_ids(values["id"], path), **numbers})
     table = table.with_row_index("line", source.first_line)
     if "day" in values:
@@ -132,14 +132,13 @@ def to_metres(table: pl.DataFrame, recipe: Recipe, path: Path) -> pl.DataFrame:
     if recipe.homography:
         u, v, w = (a * x + b * y + c for a, b, c in recipe.homography)
         return table.with_columns(x=u / w, y=v / w)
-    if origin is None and recipe.unit == DEGREES:
-        middle = table.select(x.median(), y.median()).row(0)
-        advice = advise(origin=[round(degree or 0.0, 2) for degree in middle])
-        raise DataError(
-            f"{path}: positions are longitude and latitude; pass origin=, the longitude and latitude of "
-            f"the point (0, 0), the same for all files of one place: {advice}"
-        )
-    if origin:
+    if origin or recipe.unit == DEGREES:
+        middle = table.select(col("x", "y").median().fill_null(0.0).round(2)).row(0)
+        if not origin or np.abs(np.subtract(origin, middle)).max() > _FARTHEST_ORIGIN:
+            raise DataError(
+                f"{path}: positions are longitude and latitude; pass origin=, the longitude and latitude of "
+                f"the point (0, 0), near them, the same for all files of a place: {advise(origin=[*middle])}"
+            )
         east, north = metres_in_degree(origin[1])
         return table.with_columns(x=(x - origin[0]) * east, y=(y - origin[1]) * north)
     return table.with_columns(col("^(x|y|speed)$") * recipe.metres)
@@ -176,21 +175,24 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
     for quantity in needed:
         if len(at[quantity]) > 1:
             same = sorted(map(str, set(at[quantity])))
-            advice = advise(columns={**given, quantity: at[quantity][0]})
-            unclear = f"{', '.join(same)} can all be {quantity}; {advice}"
+            chosen = {**given, quantity: at[quantity][0]}
+            unclear = (
+                f"{', '.join(same)} can all be {quantity}; {advise(columns=chosen)}"
+            )
             twice = f"names {same[0]} twice; rename one of them"
             raise DataError(f"{where}: {unclear if len(same) > 1 else twice}")
     found = {**given, **{name: at[name][0] for name in needed if at[name]}}
     if missing := [name for name in needed if not at[name]]:
-        known = ", ".join(repr(name or k) for k, name in enumerate(names[:12]))
+        known = [repr(name or k) for k, name in enumerate(names[:12])]
         columns = found | dict.fromkeys(missing, "...")
-        lacking = ", ".join(str(given.get(name, name)) for name in missing)
+        lacking = [str(given.get(name, name)) for name in missing]
         guess = ""
         if not any(names):
             columns = {name: given.get(name, k) for k, name in enumerate(needed)}
             guess = "name its format, such as petrack, or its fields; this is only a guess: "
         raise DataError(
-            f"{where} has no column {lacking}; it has {known}; {guess}{advise(columns=columns)}"
+            f"{where} has no column {', '.join(lacking)}; it has {', '.join(known)}; {guess}"
+            f"{advise(columns=columns)}"
         )
     stated = {q: _split_unit(name)[1] for q, name in found.items() if name in names}
     units = {NAMES["units"].get(stated.get(name)) for name in "xy"}
@@ -342,8 +344,8 @@ def to_times(
             values = Series(parsed.where(has_zone)).dt.replace_time_zone("UTC")
             day = text.str.slice(0, 10).str.to_date("%Y-%m-%d", strict=False)
     elif unit == "days" and values.dtype not in (pl.Date, pl.Datetime):
-        ms = ((numbers - _EXCEL_1970) * 86_400_000).round()
-        values = ms.cast(Int64, strict=False).cast(pl.Datetime("ms"))
+        values = ((numbers - _EXCEL_1970) * 86_400_000).round()
+        values = values.cast(Int64, strict=False).cast(pl.Datetime("ms"))
     if values.dtype in (pl.Date, pl.Datetime):
         zone = getattr(values.dtype, "time_zone", None)
         moments = values.cast(pl.Datetime("ns", zone), strict=False)
@@ -370,10 +372,12 @@ def to_ids(values: Series, where: Path) -> Series:
         return pl.repeat(None, len(values), dtype=Int64, eager=True)
     if not values.dtype.is_numeric():
         values = values.cast(String).str.strip_chars(" \"'")
-        values = values.set(values == "", None)
+        values = values.set(values.str.to_lowercase().is_in(_NO_IDS), None)
     number = values.cast(Float64, strict=False)
     if values.dtype == String and 2 * number.count() < values.count():
         names = values.drop_nulls().unique()
+        for name in names.filter(names.str.contains("\ufffd")):
+            raise DataError(f"{where}: the id {name!r} is not UTF-8; save it as UTF-8")
         hashes = pd.util.hash_array(names.to_numpy().astype(object), categorize=False)
         numbers = Series((hashes >> _DROPPED_BITS).astype("int64"))
         return values.replace_strict(names, numbers, default=None)

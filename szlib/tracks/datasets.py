@@ -75,10 +75,9 @@ def find(data: str | Path | Sequence[str | Path]) -> list[Path]:
     >>> [file.name for file in datasets.find("*.csv")]
     ['a.csv', 'b.csv']
     """
-    names = [data] if isinstance(data, str | Path) else list(data)
     files = [
         file
-        for name in names
+        for name in ([data] if isinstance(data, str | Path) else list(data))
         for file in (_find_named if name in DATA_SETS else _expand)(name)
     ]
     if not files:
@@ -135,6 +134,7 @@ def _expand(name: str | Path) -> list[Path]:
             found = [file for file in path.iterdir() if not file.name.startswith(".")]
     files = sorted(filter(Path.is_file, found))
     if not files:
-        reason = "is no regular file" if found else "no such file"
-        raise DataError(f"{shown}: {reason}; {expected}")
+        raise DataError(
+            f"{shown}: {'is no regular file' if found else 'no such file'}; {expected}"
+        )
     return files

@@ -29,7 +29,7 @@ KEY = "funnel"
 WARNING = "warning: "
 # why a row is rejected
 MISSING = "missing or not a number"
-NO_ID = "id not a whole number"
+NO_ID = "id not a whole number of 0 or more"
 # 2100-01-01; later time stamps are not seconds since 1970
 LAST_SECOND = 4_102_444_800.0
 FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
@@ -152,8 +152,8 @@ def table(stages: Stages) -> pd.DataFrame:
 
 def text(stages: Stages) -> str:
     """The table of `stages` as plain text in which each stage is named once."""
-    counts = table(stages).set_index(["stage", "what"])["rows"]
-    return counts.map("{:,}".format).to_string(header=False)
+    counts = table(stages).set_index(["stage", "what"])["rows"].map("{:,}".format)
+    return counts.to_string(header=False)
 
 
 def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
@@ -182,14 +182,13 @@ def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
 def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
     """Why a row of a `table` as in `Rows` is rejected; null where it is usable."""
     numbers = col("t", "x", "y")
-    places = col("x", "y")
     reasons = {
         "missing or extra fields": col.ragged,
         MISSING: pl.any_horizontal(numbers.is_null()),
-        NO_ID: col.id.is_null(),
+        NO_ID: col.id.is_null() | (col.id < 0),
         "not finite": ~pl.all_horizontal(numbers.is_finite()),
         "time not in seconds since 1970": col.t.abs() > LAST_SECOND,
-        "position not on Earth": pl.any_horizontal(places.abs() > FARTHEST),
+        "position not on Earth": pl.any_horizontal(col("x", "y").abs() > FARTHEST),
     }
     if "day" in table.collect_schema():
         reasons["no day"] = col.day.is_null()
@@ -267,8 +266,11 @@ def check_people(rows: Rows, good: pl.DataFrame, given: Recipe) -> None:
         return
     advice = _find_unit(recipe, found.high_speed)
     if not advice and found.high_speed > _FASTEST[1]:
-        scale = advise(scale=float(f"{_WALK / found.median_speed:.2g}"))
-        advice = f"leave out vehicles; if they are pixels in which people walk at {_WALK:g} m/s, {scale}"
+        scale = float(f"{_WALK / found.median_speed:.2g}")
+        advice = (
+            f"leave out vehicles; if they are pixels in which people walk at {_WALK:g} m/s, "
+            f"{advise(scale=scale)}"
+        )
     if advice:
         raise DataError(
             f"{rows.path}: {found.fault}; {advice}; if people do move like that, {advise(unit='m')}"

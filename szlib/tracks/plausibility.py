@@ -22,9 +22,9 @@ def describe_rows(rows: pl.DataFrame, recipe: Recipe, name: str) -> str:
     if rows.height == 0:
         return lines[0]
     t, people, x, y = seen = first_rows(rows)
-    first = "first " if len(t) == MAX_ROWS else ""
     lines.append(
-        f"{first}{len(t):,} rows: {len(np.unique(people)):,} people in {np.ptp(t):,.1f} s"
+        f"{'first ' if len(t) == MAX_ROWS else ''}{len(t):,} rows: "
+        f"{len(np.unique(people)):,} people in {np.ptp(t):,.1f} s"
     )
     if motion := measure_motion(seen):
         lines.append(

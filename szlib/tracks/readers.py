@@ -48,6 +48,7 @@ _HEAD = 1 << 16  # bytes of a text by which its day is found
 _FASTEST = 5.0
 _BLUR = 0.5
 _SOON = 5.0
+_MOST_SHARED = 0.02  # of all rows that may be in two recordings (assumed)
 
 Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
 """A function of rows, their area and the longest gap within a track [s]: the rows needed, sorted."""
@@ -121,8 +122,7 @@ def load_files(paths: Any, recipe: Recipe | None) -> list[LoadedFile]:
 
 def list_sources(paths: Any) -> list[Any]:
     """The files and tables of `paths`, one or many."""
-    is_one = isinstance(paths, str | Path) or is_table(paths)
-    return [paths] if is_one else list(paths)
+    return [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
 
 
 def merge_files(
@@ -134,8 +134,8 @@ def merge_files(
 
     Days `excluded` are left out, and rows that `select` leaves out.
     """
-    parts = (file.rows for file in files)
-    merged = wanted = pl.concat(parts, how="vertical_relaxed")
+    merged = pl.concat((file.rows for file in files), how="vertical_relaxed")
+    wanted = merged
     if excluded:
         wanted = merged.filter(~col.day.cast(String).is_in(excluded))
     gaps = [file.recipe.max_gap for file in files]
@@ -234,8 +234,9 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
     reasons = _count_rejected(rows, bad, table.height)
     if good.height == 0:
         raise DataError(f"{path}: holds no row; {EXPECTED}")
-    rate = f" at {recipe.frame_rate:g} frames/s" if recipe.frame_rate else ""
-    name = f"read {path.name}{rate}"
+    name = f"read {path.name}"
+    if recipe.frame_rate:
+        name += f" at {recipe.frame_rate:g} frames/s"
     stage = funnels.stage(name, table.height, good.height, reasons)
     check_people(rows, good, given)
     dates = good.get_column("day", default=local_dates(good["t"], recipe))
@@ -254,7 +255,7 @@ def _count_rejected(rows: Rows, bad: pl.DataFrame, n: int) -> dict[str, int]:
     line, reason = bad.select("line", "reason").row(0)
     held = ""
     if reason in (funnels.MISSING, funnels.NO_ID):
-        name = next(name for name in ("t", "x", "y", "id") if bad[name][0] is None)
+        name = next((name for name in ("t", "x", "y") if bad[name][0] is None), "id")
         held = f" ({_show_field(rows, line, name)})"
     most = MAX_REJECTED if recipe.max_rejected is None else recipe.max_rejected
     if n_bad <= most * n:
@@ -262,8 +263,7 @@ def _count_rejected(rows: Rows, bad: pl.DataFrame, n: int) -> dict[str, int]:
         return reasons
     advice = EXPECTED
     if n_bad < n:
-        share = ceil(100 * n_bad / n) / 100
-        advice = f"if the others are right: {advise(max_rejected=share)}"
+        advice = f"if the others are right: {advise(max_rejected=ceil(100 * n_bad / n) / 100)}"
     raise DataError(
         f"{rows.path}, line {line}: {reason}{held}; {n_bad} of {n} rows cannot be used as "
         f"{recipe.file_format}; {advice}"
@@ -345,14 +345,6 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     names = name_recordings([file.path for file in files])
     pairs = [*zip(files, names, strict=True)]
     check_names([name for file, name in pairs if file.is_named])
-    known = dict[Any, str]()
-    for file, name in pairs:
-        content = file.rows.select("id", col("t", "x", "y").round(2)).hash_rows().sum()
-        first = known.setdefault(content, name)
-        if file.is_named and first != name:
-            raise DataError(
-                f"{first} and {name} hold the same rows; pass each recording once"
-            )
     named = [
         file._replace(rows=file.rows.with_columns(day=lit(name)))
         if file.is_named
@@ -363,12 +355,19 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
         f.rows.select(col.day.cast(String), "id", "t", "x", "y", file=k)
         for k, f in enumerate(named)
     )
+    if any(file.is_named for file in files):
+        places = rows.with_columns(col("t", "x", "y").round(2)).drop("file").unique()
+        again = places.filter(pl.struct(col("id", "t", "x", "y")).is_duplicated())
+        if again.height > _MOST_SHARED * places.height:
+            raise DataError(
+                f"{' and '.join(again['day'].unique().sort())} hold the same rows; pass each recording once"
+            )
     rows = rows.filter((col.file.min() != col.file.max()).over("day", "id"))
-    step = col("t", "x", "y", "file").diff().over("day", "id")
-    steps = rows.sort("day", "id", "t").with_columns(step)
+    rows = rows.sort("day", "id", "t")
+    rows = rows.with_columns(col("t", "x", "y", "file").diff().over("day", "id"))
     length = (col.x**2 + col.y**2).sqrt()
-    is_apart = (col.file != 0) & (col.t <= _SOON) & (length > _BLUR + _FASTEST * col.t)
-    apart = steps.filter(is_apart)
+    rows = rows.filter(length > _BLUR + _FASTEST * col.t)
+    apart = rows.filter(col.file != 0, col.t <= _SOON)
     if apart.height:
         day, person = apart.select("day", "id").row(0)
         raise DataError(

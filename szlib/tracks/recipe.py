@@ -178,7 +178,7 @@ class Recipe:
     def save(self, path: str | Path) -> Path:
         """Write the recipe to the file `path`, as JSON; returns its path."""
         content = json.dumps(self.as_json(), indent=1, ensure_ascii=False)
-        write_file(path, content + "\n")
+        write_file(path, f"{content}\n")
         return Path(path)
 
     @classmethod
@@ -248,12 +248,14 @@ def find_recipe(
     """The `recipe` with `parameters` in place of its own; without one, that beside the first of `files`."""
     if recipe is None:
         paths = [Path(each) for each in files[:1] if isinstance(each, str | Path)]
-        saved = [path.parent / FILE_NAME for path in paths]
         recipe = Recipe()
-        for path in filter(Path.is_file, saved):
-            recipe = Recipe.load(path)
-            how = arguments(recipe.as_json())
-            warn(f"the settings in {path} are used: {how}; delete it if they are wrong")
+        for path in (each.parent / FILE_NAME for each in paths):
+            if path.is_file():
+                recipe = Recipe.load(path)
+                warn(
+                    f"the settings in {path} are used: {arguments(recipe.as_json())}; delete it if they are "
+                    "wrong"
+                )
     given = {name: value for name, value in parameters.items() if value is not None}
     return Recipe(**given).over(recipe)
 
@@ -281,7 +283,7 @@ def arguments(recipe: Mapping[str, Any]) -> str:
 def advise(**recipe: Any) -> str:
     """Advice to read again with values of a `recipe`: arguments, or from a shell the whole command."""
     if command := os.environ.get(COMMAND_VARIABLE):
-        is_long = len(command) > _LONGEST_COMMAND
-        shown = "the same command with" if is_long else command
-        return f"try: {shown} {arguments(recipe)}"
+        if len(command) > _LONGEST_COMMAND:
+            command = "the same command with"
+        return f"try: {command} {arguments(recipe)}"
     return "pass " + " and ".join(f"{name}={value!r}" for name, value in recipe.items())

@@ -200,8 +200,8 @@ def open_database(file: File) -> list[Source]:
         )
 
     try:
-        tables = query("SELECT name FROM sqlite_master WHERE type = 'table'")
-        return [open_one(name) for (name,) in tables]
+        names = query("SELECT name FROM sqlite_master WHERE type = 'table'")
+        return [open_one(*name) for name in names]
     except sqlite3.DatabaseError:
         return []
 
@@ -248,9 +248,9 @@ def read_magni_rows(path: Path, plain: Path | None = None) -> pd.DataFrame:
         check_columns(rows, list(SHAPES["magni"].header))
         helmet = rows["ag_id"].astype(str).str.extract(r"(\d+)$")[0]
     if helmet.isna().any():
-        name = rows.loc[helmet.isna(), "ag_id"].iloc[0]
         raise DataError(
-            f"{path}: ag_id {name!r} ends in no number; expected one like Helmet_4"
+            f"{path}: ag_id {rows.loc[helmet.isna(), 'ag_id'].iloc[0]!r} ends in no number; expected one "
+            "like Helmet_4"
         )
     times = np.unique(rows["Time"])
     step = np.diff(times)
@@ -308,9 +308,8 @@ def _parse_nuscenes(file: File) -> ParsedFile:
         person = each["instance_token"]
         kind = kinds[instances[person]["category_token"]]["name"]
         if kind.startswith("human"):
-            t = 1e-6 * sample["timestamp"]
-            scene = sample["scene_token"]
-            rows.append((t, person, *each["translation"][:2], scene))
+            begin = 1e-6 * sample["timestamp"], person, *each["translation"][:2]
+            rows.append((*begin, sample["scene_token"]))
     return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), {}
 
 
@@ -343,8 +342,9 @@ def _load_by_pedpy(loader: str, file: File) -> ParsedFile:
             )
         given = {"default_frame_rate": recipe.frame_rate, "default_unit": known[got]}
     elif recipe.frame_rate is not None or recipe.has_metres:
-        stated = "states its frame rate and is in metres"
-        raise DataError(f"{path}: {stated}; leave frame_rate, unit and scale out")
+        raise DataError(
+            f"{path}: states its frame rate and is in metres; leave frame_rate, unit and scale out"
+        )
     elif loader == "vadere":
         given = {"frame_rate": _VADERE_RATE}
     load = getattr(pedpy, f"load_trajectory_from_{loader}")

@@ -340,6 +340,6 @@ def scan_streamed(file: File) -> Rows | None:
     )
     ragged = col("extra").is_not_null() | col(f"f{shape.n_fields - 1}").is_null()
     values = {name: col(f"f{at}") for name, at in recipe.columns.items()}
-    metres = col("^(x|y|speed)$") * recipe.metres
-    table = scan.select("line", ragged=ragged, **values).with_columns(metres)
+    table = scan.select("line", ragged=ragged, **values)
+    table = table.with_columns(col("^(x|y|speed)$") * recipe.metres)
     return Rows(file.path, recipe, table, n_bytes=file.plain.stat().st_size)

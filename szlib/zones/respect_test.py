@@ -255,10 +255,10 @@ class NullTest:
         return self.p_value <= SIGNIFICANCE_LEVEL
 
     def __str__(self) -> str:
-        result = (
-            "people avoid each other" if self.is_significant else "no respect shown"
+        return (
+            f"{'people avoid each other' if self.is_significant else 'no respect shown'} "
+            f"(p = {self.p_value:.2g}, {self.n_shifts} shifts, {self.n_encounters:,} encounters)"
         )
-        return f"{result} (p = {self.p_value:.2g}, {self.n_shifts} shifts, {self.n_encounters:,} encounters)"
 
 
 def null_test(

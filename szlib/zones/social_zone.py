@@ -141,17 +141,15 @@ class SocialZone:
             return ", ".join(f"{speed:g}" for speed in speeds) or "none"
 
         table = self.table()
-        sizes = [
-            f"{row.speed:g}: {row.a:.2f} x {row.b:.2f}" for row in table.itertuples()
-        ]
+        rows = table.itertuples()
         by_verdict = table.groupby("verdict", sort=False)["speed"].agg(listed)
-        verdicts = [f"{verdict} at {at} m/s" for verdict, at in by_verdict.items()]
         return (
             f"SocialZone: method {self.method!r}, people within {self.r_max:g} m\n"
-            f"semi-axes at each speed [m/s: m]: {', '.join(sizes) or 'none'}\n"
+            "semi-axes at each speed [m/s: m]: "
+            f"{', '.join(f'{row.speed:g}: {row.a:.2f} x {row.b:.2f}' for row in rows) or 'none'}\n"
             f"undefined at [m/s]: {listed(self.undefined)}\n"
             f"enough encounters at [m/s]: {listed(table['speed'][table['adequate']])}\n"
-            f"verdict: {'; '.join(verdicts)}\n"
+            f"verdict: {'; '.join(f'{verdict} at {at} m/s' for verdict, at in by_verdict.items())}\n"
             f"intervals: {'none' if self.uncertainty is None else self.uncertainty.description}"
         )
 

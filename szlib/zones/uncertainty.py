@@ -130,8 +130,9 @@ def describe_missing_speed(counts: pd.DataFrame, speed: float) -> str:
     seen = counts.loc[counts["encounters"] > 0, "speed"]
     if seen.min() <= speed <= seen.max():
         return ""
-    only = f" (only at {seen.min():g} to {seen.max():g} m/s)" if len(seen) else ""
-    return f"at {speed:g} m/s no encounters were counted{only}"
+    if seen.empty:
+        return f"at {speed:g} m/s no encounters were counted"
+    return f"at {speed:g} m/s no encounters were counted (only at {seen.min():g} to {seen.max():g} m/s)"
 
 
 def describe_missing_sides(counts: pd.DataFrame, speed: float) -> str:

@@ -208,7 +208,8 @@ def test_ewap_files_of_one_name_are_recordings_of_their_own(tmp_path: Path) -> N
     paths = []
     for name, people in (("eth", 2), ("hotel", 3)):
         (tmp_path / name).mkdir()
-        text = as_ewap(samples(people=people))
+        rows = samples(people=people)
+        text = as_ewap(rows.assign(y=rows["y"] + people))
         paths.append(write(tmp_path / name / "obsmat.txt", text))
     assert set(read_raw(paths)["day"]) == {"eth-obsmat", "hotel-obsmat"}
     hotel = write(tmp_path / "hotel.txt", paths[1].read_text())
@@ -230,8 +231,8 @@ BAD_ROWS = {
     "1351040400.4,7,5,NaN,1.2,0.1": "not finite",
     "1351040400.4,7,inf,5,1.2,0.1": "not finite",
     "1351040400.4,7,5,-1e400,1.2,0.1": "not finite",
-    "1351040400.4,7.5,5,5,1.2,0.1": "id not a whole number",
-    "1351040400.4,1e300,5,5,1.2,0.1": "id not a whole number",
+    "1351040400.4,7.5,5,5,1.2,0.1": "id not a whole number of 0 or more",
+    "1351040400.4,1e300,5,5,1.2,0.1": "id not a whole number of 0 or more",
     "1351040400400,7,5,5,1.2,0.1": "time not in seconds since 1970",
     "1e308,7,5,5,1.2,0.1": "time not in seconds since 1970",
     "1351040400.4,7,1e300,5,1.2,0.1": "position not on Earth",
@@ -297,6 +298,29 @@ def test_a_file_with_more_than_a_twentieth_of_bad_rows_is_refused(
         assert len(read_raw(path, recipe=szlib.Recipe(max_rejected=0.06))) == 56
     with pytest.raises(szlib.DataError, match="max_rejected must be from 0 to 1"):
         szlib.Recipe(max_rejected=2)
+
+
+@pytest.mark.parametrize("nobody", ["-1", "nan", "None", "NULL"])
+def test_rows_of_nobody_are_rejected(tmp_path: Path, nobody: str) -> None:
+    rows = samples().astype({"id": str})
+    rows.loc[[3, 4], "id"] = nobody
+    _, message = read_quietly(write(tmp_path / "a.csv", as_tidy(rows)))
+    assert message.startswith(f"a.csv, first at line 5 (column 'id' holds {nobody!r})")
+    assert message.endswith("2 x id not a whole number of 0 or more")
+
+
+def test_names_that_are_not_utf8_are_refused(tmp_path: Path) -> None:
+    rows = samples().assign(id="Müller")
+    text = as_tidy(rows).encode("latin-1")
+    with pytest.raises(szlib.DataError, match="is not UTF-8; save it as UTF-8"):
+        read_raw(write(tmp_path / "a.csv", text))
+
+
+def test_an_origin_far_from_the_positions_is_refused() -> None:
+    rows = samples().assign(x=8.5, y=lambda table: 47.3 + 1e-5 * table["t"])
+    for origin in ((0.0, 0.0), (47.3, 8.5)):
+        with pytest.raises(szlib.DataError, match=r"near them.* origin=\[8.5, "):
+            szlib.read_tracks(rows, unit="deg", origin=origin)
 
 
 def test_rows_without_a_day_are_rejected(tmp_path: Path) -> None:
@@ -524,7 +548,7 @@ def test_ids_that_are_not_exact_are_rejected_by_line(tmp_path: Path, text: str) 
     floats.to_parquet(tmp_path / "a.parquet")
     with pytest.raises(
         szlib.DataError,
-        match=r"line 1: id not a whole number \(column 'id'\); 40 of 40 rows",
+        match=r"line 1: id not a whole number of 0 or more \(column 'id'\); 40 of 40 rows",
     ):
         read_raw(tmp_path / "a.parquet")
 

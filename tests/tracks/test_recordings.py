@@ -105,12 +105,23 @@ def test_copies_of_a_recording_are_refused_whatever_their_names(tmp_path: Path) 
     single = tmp_path / "single.parquet"
     rows.astype({"t": "float32", "x": "float32"}).to_parquet(single)
     for copy in (shuffled, packed, rounded, single):
-        with pytest.raises(szlib.DataError, match=r"monday and .* hold the same rows"):
+        with pytest.raises(szlib.DataError, match=r"and .* hold the same rows"):
             szlib.read_tracks([first, copy])
     with pytest.raises(szlib.DataError, match="hold the same rows"):
         szlib.read_tracks([rows, rows])
     others = write(tmp_path / "tuesday.csv", recording(0.1))
     assert szlib.read_tracks([first, others])["day"].nunique() == 2
+
+
+def test_a_part_of_another_recording_is_refused(tmp_path: Path) -> None:
+    """People in both would count twice: half as many would seem enough for a zone."""
+    rows = recording(0.0)
+    whole = write(tmp_path / "whole.csv", rows)
+    part = write(tmp_path / "part.csv", rows.iloc[len(rows) // 2 :])
+    holes = write(tmp_path / "holes.csv", rows[rows.index % 50 > 0])
+    for other in (part, holes):
+        with pytest.raises(szlib.DataError, match="whole hold the same rows"):
+            szlib.read_tracks([whole, other])
 
 
 def test_only_regular_files_are_read(tmp_path: Path) -> None:

@@ -198,6 +198,22 @@ def test_intervals_in_the_wrong_place_or_too_wide_are_undecided(
     assert re.search(reason, verdict.sentence)
 
 
+def test_intervals_finer_than_positions_far_apart_can_tell_are_undecided(careful):
+    """People who step aside between two positions seem nearer than they were."""
+    stage = {"stage": "clock: samples", "entered": 1, "kept": 1, "rejected": {}}
+    for interval, expected in ((0.1, "usable"), (0.5, "usable"), (1.5, "undecided")):
+        funnel = [stage | {"interval": interval, "positions": 30.0}]
+        zone = replace(careful, provenance=careful.provenance | {"funnel": funnel})
+        assert zone.verdict(SPEED) == expected
+    assert "positions are 1.5 s apart" in zone.verdict(SPEED).sentence
+
+
+def test_tracks_of_few_positions_are_undecided(careful):
+    stage = {"stage": "clock: samples", "interval": 0.3, "positions": 7.0}
+    zone = replace(careful, provenance=careful.provenance | {"funnel": [stage]})
+    assert zone.verdict(SPEED).reasons[0].startswith("a track has 7 positions")
+
+
 def test_chains_that_do_not_agree_are_undecided(careful):
     apart = replace(careful.uncertainty, has_converged=False)
     verdict = replace(careful, uncertainty=apart).verdict(SPEED)
