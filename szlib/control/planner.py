@@ -62,8 +62,6 @@ _FIRST_MARGIN = (
 _MULTIPLE = (
     16  # and this number of zones and walls, or a multiple: few sizes of problems
 )
-_FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
-_EVERY = slice(None)
 _MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 # DAQP's answers; the second one if it violates rows with a price
@@ -179,13 +177,11 @@ class Program(LinearProblem):
 
         None if nothing satisfies the rows that are always there.
         """
-        rows: Any = _EVERY
-        if len(self.levels) > _FEW_ROWS:
-            rows = np.flatnonzero(self.lower > self.near)
+        rows = np.flatnonzero(self.lower > self.near)
         found = self._solve_rows(rows, self.lower, self.prices, self._sense)
         is_relaxed = found is None or (found[2] and self._is_hard)
         if found is None:
-            found = self._solve_levels(np.arange(len(self.lower))[rows])
+            found = self._solve_levels(rows)
         if found is None:
             return None
         n = len(self.gradient)
