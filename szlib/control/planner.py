@@ -31,7 +31,7 @@ then all levels are one quadratic program.
 *Method.* Each iteration linearises the rows at the plan. h is convex, so that a linearised floor implies the
 true one: an iteration with all rows satisfied keeps them, and lowers the cost (a convex-concave procedure:
 Yuille and Rangarajan, Neural Computation 15, 2003). So full steps are taken. Rows that cannot become active
-within the iteration are left out.
+within the iteration, those with a value above `NEAR`, are left out.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ from .settings import TOLERANCE, MPCSettings
 CONVERGED = 1e-3
 # Price of a metre of decay without `decay_price`, in the unit of the scaled cost: above every multiplier.
 HARD_PRICE = 1e5
-# Rows with a larger value are left out of an iteration [m]; smaller where the plan cannot change so much.
+# Rows of obstacles with a larger value are left out of an iteration [m].
 NEAR = 1.0
 _MOST_UNFILTERED = 24  # with at most so many obstacles, a problem contains all of them
 _FIRST_MARGIN = (
@@ -147,7 +147,6 @@ class Program(LinearProblem):
 
     Attributes
     ----------
-    near : below this lower bound a row cannot become active within an iteration.
     prices : of the violation of rows; 0: none.
     """
 
@@ -157,12 +156,7 @@ class Program(LinearProblem):
         super().__init__(settings, shapes, has_floors)
         s = settings
         k = self.steps
-        times = s.times
-        # inputs change by 2 a_max at most on each axis
-        change = np.sqrt(2) * s.a_max * (times[1:] ** 2 + times[:-1] ** 2)
-        self.near = np.full_like(self.lower, -inf)
         self.prices = np.zeros_like(self.lower)
-        self.near[self.first :] = -np.minimum(change, NEAR)[k]
         zone_price = s.zone_price if s.zone_price < inf else 0.0
         of_level = np.array([0.0, 0.0, zone_price, s.decay_price])
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
@@ -177,7 +171,9 @@ class Program(LinearProblem):
 
         None if nothing satisfies the rows that are always there.
         """
-        rows = np.flatnonzero(self.lower > self.near)
+        is_near = self.lower > -NEAR
+        is_near[: self.first] = True
+        rows = np.flatnonzero(is_near)
         found = self._solve_rows(rows, self.lower, self.prices, self._sense)
         is_relaxed = found is None or (found[2] and self._is_hard)
         if found is None:
