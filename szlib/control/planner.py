@@ -36,6 +36,7 @@ within the iteration, those with a value above `NEAR`, are left out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot, inf
 from time import perf_counter, thread_time
 from typing import Any, NamedTuple
@@ -45,8 +46,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.checks import Array
-from .obstacles import Priority, find_bodies
-from .problem import LinearProblem, Question, build_horizon, follow_velocities
+from .obstacles import Group, Priority, find_bodies
+from .problem import (
+    Question,
+    bind,
+    build_horizon,
+    follow_velocities,
+    linearise_kind,
+    linearise_motion,
+    list_conditions,
+)
 from .settings import TOLERANCE, MPCSettings
 
 # The iterations end if the change of the inputs is smaller, as a vector [m/s2].
@@ -138,24 +147,78 @@ class TimeBudget:
         return is_late and thread_time() - self._thread > self._limit
 
 
-class Program(LinearProblem):
-    """A linear problem that is solved by priorities.
+class Program:
+    """The problem linearised at a plan, and its solution by priorities: set `inputs`, `evaluate`, and `solve`.
+
+    Its arrays stay where they are.
+
+    The unknown is the change d of the inputs; the rows are the limits of d, the speed limits, rest at the
+    end, and then the conditions on obstacles: lower <= slopes d <= upper, where the first 2 N slopes, of the
+    limits, are left out: zeros.
 
     Parameters
     ----------
-    settings, shapes, has_floors : as of `LinearProblem`.
+    settings : of the controller.
+    shapes : kind, number and count of numbers of each group of obstacles.
+    has_floors : as of `list_conditions`.
 
     Attributes
     ----------
+    inputs, given, multipliers : of the plan, shape (N, 2); the state, the target and the last input, 8
+        numbers; of the speed limits, negative where one holds. To be filled.
+    lower, upper, slopes : of the rows.
+    hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
+    first : number of rows before those of obstacles.
+    levels : of each row of obstacles.
     prices : of the violation of rows; 0: none.
     """
 
     def __init__(
         self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
     ) -> None:
-        super().__init__(settings, shapes, has_floors)
         s = settings
-        k = self.steps
+        n = 2 * settings.N
+        motion = linearise_motion(settings)
+        kinds = [kind for kind, number, _ in shapes for _ in range(number)]
+        rows = [
+            (condition.level, k)
+            for kind in kinds
+            for condition in list_conditions(s, kind, has_floors)
+            for k in range(len(condition.keep))
+        ]
+        self.levels, k = np.reshape(rows, (-1, 2)).astype(int).T
+        self.first = motion.numel_out(1)
+        size = self.first + len(rows)
+        self.inputs = np.zeros((s.N, 2))
+        self.given = np.zeros(8)
+        self.multipliers = np.zeros(s.N)
+        self.lower = np.zeros(size)
+        self.upper = np.full(size, 1e30)
+        self.slopes = np.zeros((size, n))
+        self.hessian = np.zeros((n, n))
+        self.gradient = np.zeros(n)
+        self.cost = np.zeros(1)
+        arguments = [self.inputs, self.given, self.multipliers]
+        positions = np.zeros((s.N + 1, 2))
+        begin = self.first
+        results = [
+            positions,
+            self.lower,
+            self.upper,
+            self.slopes[n:],
+            self.hessian,
+            self.gradient,
+            self.cost,
+        ]
+        self._calls = [bind(motion, arguments, results)]
+        self._numbers = list[Array]()
+        for kind, number, count in shapes:
+            numbers = np.zeros((number, count + 1))
+            function = linearise_kind(s, kind, has_floors, number, count)
+            results = [self.lower[begin:], self.slopes[begin:]]
+            self._calls.append(bind(function, (positions, numbers), results))
+            self._numbers.append(numbers)
+            begin += function.numel_out(0)
         self.prices = np.zeros_like(self.lower)
         zone_price = s.zone_price if s.zone_price < inf else 0.0
         of_level = np.array([0.0, 0.0, zone_price, s.decay_price])
@@ -165,6 +228,16 @@ class Program(LinearProblem):
         self._sense = np.where(self.prices > 0, _SOFT, _HARD).astype(np.intc)
         self._sense[3 * s.N : self.first] = _EQUAL
         self._models = dict[Any, Any]()
+
+    def take(self, groups: Sequence[Group]) -> None:
+        """Take the numbers of `groups` of obstacles of these shapes."""
+        for numbers, group in zip(self._numbers, groups, strict=True):
+            numbers[:, :-1], numbers[:, -1] = group.numbers, group.offsets
+
+    def evaluate(self) -> None:
+        """Fill the arrays at the `inputs`."""
+        for call, _ in self._calls:
+            call()
 
     def solve(self) -> tuple[Array, bool] | None:
         """The change of least cost by the priorities, True if it is relaxed; sets the multipliers of speed.

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..core.checks import Array
-from .obstacles import Group, Obstacle, Obstacles, Priority
+from .obstacles import Obstacle, Obstacles, Priority
 from .settings import TOLERANCE, MPCSettings
 
 
@@ -140,12 +140,12 @@ def list_conditions(
 
 
 @lru_cache(maxsize=1024)
-def _linearise_kind(
+def linearise_kind(
     settings: MPCSettings, kind: Any, has_floors: bool, n: int, count: int
 ) -> Any:
     """(positions, numbers and offsets) -> (bounds, slopes) of all conditions on `n` obstacles of a kind."""
     if n > 1:
-        of_one = _linearise_kind(settings, kind, has_floors, 1, count)
+        of_one = linearise_kind(settings, kind, has_floors, 1, count)
         return of_one.map(n, [True, False], [False, False])
     at = ca.SX.sym("at", 2, settings.N + 1)
     numbers = ca.SX.sym("numbers", count + 1)
@@ -171,8 +171,8 @@ _MOST_CURVED = 1e3
 
 
 @lru_cache
-def _linearise_motion(settings: MPCSettings) -> Any:
-    """The part of a quadratic program without obstacles: see `LinearProblem`."""
+def linearise_motion(settings: MPCSettings) -> Any:
+    """The part of a quadratic program without obstacles: see `planner.Program`."""
     s = settings
     n = s.N
     inputs = ca.SX.sym("u", 2, n)
@@ -222,88 +222,7 @@ def _linearise_motion(settings: MPCSettings) -> Any:
     return ca.Function("motion", arguments, dense, {"cse": True})
 
 
-class LinearProblem:
-    """The problem linearised at a plan, in arrays that stay where they are: set `inputs`, then `evaluate`.
-
-    The unknown is the change d of the inputs; the rows are the limits of d, the speed limits, rest at the
-    end, and then the conditions on obstacles: lower <= slopes d <= upper, where the first 2 N slopes, of the
-    limits, are left out: zeros.
-
-    Parameters
-    ----------
-    settings : of the controller.
-    shapes : kind, number and count of numbers of each group of obstacles.
-    has_floors : as of `list_conditions`.
-
-    Attributes
-    ----------
-    inputs, given, multipliers : of the plan, shape (N, 2); the state, the target and the last input, 8
-        numbers; of the speed limits, negative where one holds. To be filled.
-    lower, upper, slopes : of the rows.
-    hessian, gradient, cost : of the Lagrangian and of the cost, for each metre to the target (at least 1 m).
-    first : number of rows before those of obstacles.
-    levels, steps : of each row of obstacles, its level and its k.
-    """
-
-    def __init__(
-        self, settings: MPCSettings, shapes: tuple[Any, ...], has_floors: bool
-    ) -> None:
-        s = settings
-        n = 2 * settings.N
-        motion = _linearise_motion(settings)
-        kinds = [kind for kind, number, _ in shapes for _ in range(number)]
-        rows = [
-            (condition.level, k)
-            for kind in kinds
-            for condition in list_conditions(s, kind, has_floors)
-            for k in range(len(condition.keep))
-        ]
-        self.levels, self.steps = np.reshape(rows, (-1, 2)).astype(int).T
-        self.first = motion.numel_out(1)
-        size = self.first + len(rows)
-        self.inputs = np.zeros((s.N, 2))
-        self.given = np.zeros(8)
-        self.multipliers = np.zeros(s.N)
-        self.lower = np.zeros(size)
-        self.upper = np.full(size, 1e30)
-        self.slopes = np.zeros((size, n))
-        self.hessian = np.zeros((n, n))
-        self.gradient = np.zeros(n)
-        self.cost = np.zeros(1)
-        arguments = [self.inputs, self.given, self.multipliers]
-        positions = np.zeros((s.N + 1, 2))
-        begin = self.first
-        results = [
-            positions,
-            self.lower,
-            self.upper,
-            self.slopes[n:],
-            self.hessian,
-            self.gradient,
-            self.cost,
-        ]
-        self._calls = [_call(motion, arguments, results)]
-        self._numbers = list[Array]()
-        for kind, number, count in shapes:
-            numbers = np.zeros((number, count + 1))
-            function = _linearise_kind(s, kind, has_floors, number, count)
-            results = [self.lower[begin:], self.slopes[begin:]]
-            self._calls.append(_call(function, (positions, numbers), results))
-            self._numbers.append(numbers)
-            begin += function.numel_out(0)
-
-    def take(self, groups: Sequence[Group]) -> None:
-        """Take the numbers of `groups` of obstacles of these shapes."""
-        for numbers, group in zip(self._numbers, groups, strict=True):
-            numbers[:, :-1], numbers[:, -1] = group.numbers, group.offsets
-
-    def evaluate(self) -> None:
-        """Fill the arrays at the `inputs`."""
-        for call, _ in self._calls:
-            call()
-
-
-def _call(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> Any:
+def bind(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> Any:
     """A call of a CasADi function on fixed arrays, and what must live as long.
 
     It saves the conversions of an ordinary call, which take ten times as long as these functions.

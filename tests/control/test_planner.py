@@ -16,7 +16,7 @@ import szlib
 from szlib.control import Body, HalfPlane, Obstacles, Priority, Wall, Zone, mpc, planner
 from szlib.control.controller import advance
 from szlib.control.planner import Planner, TimeBudget
-from szlib.control.problem import LinearProblem, Question, list_conditions
+from szlib.control.problem import Program, Question, list_conditions
 from szlib.control.settings import TOLERANCE
 
 GOAL = (4.0, 0.0)
@@ -205,7 +205,7 @@ def test_linearised_rows_equal_those_by_differences(formulation, has_floors):
         if list_conditions(s, group.kind, has_floors)
     ]
     shapes = tuple((g.kind, *g.numbers.shape) for g in groups)
-    problem = LinearProblem(s, shapes, has_floors)
+    problem = Program(s, shapes, has_floors)
     problem.take(groups)
     state, target = rng.uniform(-1, 1, 4), (5.0, 1.0)
     problem.given[:4], problem.given[4:6] = state, target
