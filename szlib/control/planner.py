@@ -148,9 +148,9 @@ class TimeBudget:
 
 
 class Program:
-    """The problem linearised at a plan, and its solution by priorities: set `inputs`, `evaluate`, and `solve`.
+    """The problem linearised at a plan, and its solution by priorities, in arrays that stay where they are.
 
-    Its arrays stay where they are.
+    Set `inputs`, then `evaluate` and `solve`.
 
     The unknown is the change d of the inputs; the rows are the limits of d, the speed limits, rest at the
     end, and then the conditions on obstacles: lower <= slopes d <= upper, where the first 2 N slopes, of the
@@ -219,13 +219,13 @@ class Program:
             self._calls.append(bind(function, (positions, numbers), results))
             self._numbers.append(numbers)
             begin += function.numel_out(0)
-        self.prices = np.zeros_like(self.lower)
+        self.prices = np.zeros(size)
         zone_price = s.zone_price if s.zone_price < inf else 0.0
         of_level = np.array([0.0, 0.0, zone_price, s.decay_price])
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
         self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
         self._is_hard = s.decay_price >= HARD_PRICE
-        self._sense = np.where(self.prices > 0, _SOFT, _HARD).astype(np.intc)
+        self._sense = np.full(size, _HARD, np.intc)
         self._sense[3 * s.N : self.first] = _EQUAL
         self._models = dict[Any, Any]()
 
@@ -247,7 +247,7 @@ class Program:
         is_near = self.lower > -NEAR
         is_near[: self.first] = True
         rows = np.flatnonzero(is_near)
-        found = self._solve_rows(rows, self.lower, self.prices, self._sense)
+        found = self._solve_rows(rows, self.lower, self.prices)
         is_relaxed = found is None or (found[2] and self._is_hard)
         if found is None:
             found = self._solve_levels(rows)
@@ -258,28 +258,26 @@ class Program:
         return found[0], is_relaxed
 
     def _solve_rows(
-        self, rows: Any, lower: Array, prices: Array, sense: NDArray[np.intc]
+        self, rows: NDArray[np.intp], lower: Array, prices: Array
     ) -> tuple[Array, Array, bool] | None:
         """d, the multipliers of the rows, and whether rows with a price are violated.
 
-        Of the problem it has these rows, with other lower bounds, prices, and kinds of constraints. None if
-        hard rows contradict each other. To change a model of DAQP takes half the time of a new one, and its
-        answers are the same; the number of rows with a price must not change, because it sizes the memory.
+        Of the problem it has these rows, with other lower bounds and prices; those with a price are soft.
+        None if hard rows contradict each other.
         """
         weights = prices[rows]
         slopes = self.slopes[rows][len(self.gradient) :]
         given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
-        size = None if rows is _EVERY else (len(weights), np.count_nonzero(weights))
+        sense = np.where(weights > 0, _SOFT, self._sense[rows])
+        size = len(weights), np.count_nonzero(weights)
         model = self._models.pop(size, None)
         if model is None:
             model = daqp.Model()
             model.settings = _DAQP
-            flag, _ = model.setup(*given, sense[rows])
-            model.soft_weights(w_l=weights, w_u=weights)
+            flag, _ = model.setup(*given, sense)
         else:
-            flag = model.update(*given, sense[rows])
-            if size:  # all rows together always have the same prices
-                model.soft_weights(w_l=weights, w_u=weights)
+            flag = model.update(*given, sense)
+        model.soft_weights(w_l=weights, w_u=weights)
         if flag < 0:
             return None
         step, _, flag, info = model.solve()
@@ -294,21 +292,19 @@ class Program:
         found = None
         lower = self.lower.copy()
         prices = self.prices.copy()
-        sense = self._sense.copy()
         chosen, near = np.split(near, [self.first])
         levels = self.levels[near - self.first]
         for level in np.unique(levels):
             rows = near[levels == level]
             prices[rows] = np.where(prices[rows] > 0, prices[rows], HARD_PRICE)
-            sense[rows] = _SOFT
             chosen = np.concatenate([chosen, rows])
-            solved = self._solve_rows(chosen, lower, prices, sense)
+            solved = self._solve_rows(chosen, lower, prices)
             if solved is None:
                 break
             found = solved
             left = lower[rows] - self.slopes[rows] @ found[0]
             lower[rows] -= np.maximum(left, 0.0) + 1e-9
-            prices[rows], sense[rows] = 0.0, _HARD
+            prices[rows] = 0.0
         return found
 
     def is_violated(self) -> bool:
