@@ -93,8 +93,7 @@ class Plan(NamedTuple):
     Attributes
     ----------
     inputs : accelerations, shape (N, 2) [m/s2].
-    cost : with the prices of what is violated, before the last change if it converged; 0 of a plan that is
-        compared with no other.
+    cost : with the prices of what is violated, before the last change if it converged.
     violations : if rows without a price contradict each other, the sums of the violations of walls, bodies
         and zones [m]; else empty.
     is_relaxed : True if rows without a price contradict each other.
@@ -134,17 +133,15 @@ class TimeBudget:
 
     def extend(self) -> None:
         """Measure the computing time anew: a problem of a new size was built, which is done once."""
-        self._wall = perf_counter()
         self._thread = thread_time()
 
     @property
     def is_spent(self) -> bool:
         """True if the time is used up. The thread's clock is slow, so it is read last."""
-        now = perf_counter()
-        if now - self._began > self._deadline:
+        taken = perf_counter() - self._began
+        if taken > self._deadline:
             return True
-        is_late = now - self._wall > self._limit
-        return is_late and thread_time() - self._thread > self._limit
+        return taken > self._limit and thread_time() - self._thread > self._limit
 
 
 class Program:
@@ -452,8 +449,5 @@ class Planner:
             program.evaluate()
             is_relaxed = is_relaxed or program.is_violated()
         violations = program.sum_violations() if is_relaxed else ()
-        cost = 0.0
-        if is_relaxed or s.lookahead < inf:  # it may be compared
-            of_rows = program.lower.clip(0.0) @ program.prices
-            cost = float(program.cost[0] + of_rows)
+        cost = float(program.cost[0] + program.lower.clip(0.0) @ program.prices)
         return Plan(inputs, cost, violations, is_relaxed, timed_out)
