@@ -39,7 +39,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from math import dist, hypot, inf
-from threading import get_ident
 from time import perf_counter
 from typing import Any
 from warnings import catch_warnings
@@ -157,7 +156,6 @@ class MPCCBF(Controller):
         self._s = self._plan_with(self.settings)
         self.zone = _choose_zone(zone, self._s.zone_speed)
         self.tracker = tracker or Tracker()
-        self._thread = dict[str, int]()
         self._planner = Planner(self._s)
         self._take_walls(walls)
         self._take_obstacles(obstacles)
@@ -181,7 +179,7 @@ class MPCCBF(Controller):
     @obstacles.setter
     def obstacles(self, obstacles: Iterable[Obstacle]) -> None:
         """Replace what else stands still, from the next step on."""
-        self._check_thread()
+        self._planner.check_thread()
         self._take_obstacles(obstacles)
 
     def _plan_with(self, s: MPCSettings) -> MPCSettings:
@@ -222,19 +220,9 @@ class MPCCBF(Controller):
         SolverError : as of `MPCCBF`, and the walls stay as they were; or the controller belongs to another
             thread.
         """
-        self._check_thread()
+        self._planner.check_thread()
         self._take_walls(walls)
         self._take_obstacles(self._obstacles)
-
-    def _check_thread(self) -> None:
-        if self._thread.setdefault("first", get_ident()) != get_ident():
-            raise SolverError(
-                "this controller belongs to another thread; build one in each thread"
-            )
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the thread: a copy continues from the same plan, in another thread."""
-        return {**self.__dict__, "_thread": {}}
 
     def reset(self) -> None:
         """Forget the last plan and all people, so that the next step depends on no earlier one."""
@@ -275,7 +263,7 @@ class MPCCBF(Controller):
         """
         began = perf_counter()
         clock = self._clock
-        self._check_thread()
+        self._planner.check_thread()
         clock.tick(now, stamps, self.tracker.memory)
         age = check_number("state_age", state_age)
         x, towards = self._locate(state, check_point("goal", goal), age)
@@ -283,7 +271,7 @@ class MPCCBF(Controller):
         scene = self._make_scene(x, towards, tracked, is_point=True)
         heading = self._choose_heading(scene)
         remaining = heading.length if heading.length < inf else dist(x[:2], towards)
-        self._planner.budget.begin(began)
+        self._planner.begin(began)
         status, plan, (walls_safe, passively_safe) = self._choose(scene, heading)
         step: Step = self._finish(
             control=plan.inputs[0].copy(),

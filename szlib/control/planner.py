@@ -38,6 +38,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import hypot, inf
+from threading import get_ident
 from time import perf_counter, thread_time
 from typing import Any, NamedTuple
 
@@ -46,6 +47,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.checks import Array
+from ..core.errors import SolverError
 from .obstacles import Group, Priority, find_bodies
 from .problem import (
     Question,
@@ -110,38 +112,6 @@ class Plan(NamedTuple):
     def rank(self) -> tuple[Any, ...]:
         """Of two plans the better one has the lesser rank: by violations, and then by cost."""
         return self.violations, self.cost
-
-
-class TimeBudget:
-    """The time of one step; call `begin` at its start.
-
-    Parameters
-    ----------
-    limit : computing time of the thread [s], or inf.
-    deadline : time of a clock on the wall [s], or inf.
-    """
-
-    def __init__(self, limit: float, deadline: float = inf) -> None:
-        self._limit = limit
-        self._deadline = deadline
-        self.begin(perf_counter())
-
-    def begin(self, began: float) -> None:
-        """Start to measure; by the clock on the wall the step `began` earlier [s]."""
-        self._began = began
-        self.extend()
-
-    def extend(self) -> None:
-        """Measure the computing time anew: a problem of a new size was built, which is done once."""
-        self._thread = thread_time()
-
-    @property
-    def is_spent(self) -> bool:
-        """True if the time is used up. The thread's clock is slow, so it is read last."""
-        taken = perf_counter() - self._began
-        if taken > self._deadline:
-            return True
-        return taken > self._limit and thread_time() - self._thread > self._limit
 
 
 class Program:
@@ -332,25 +302,43 @@ class Planner:
     Parameters
     ----------
     settings : of the controller.
-
-    Attributes
-    ----------
-    budget : the computing time of a step.
     """
 
     def __init__(self, settings: MPCSettings) -> None:
         self.settings = settings
-        self.budget = TimeBudget(settings.time_limit, settings.deadline)
         self._programs = dict[Any, Program]()
+        self._thread = dict[str, int]()
         self.reset()
+        self.begin(perf_counter())
 
     def reset(self) -> None:
         """Forget the multipliers of the speed limit: they save time, and change answers by rounding only."""
         self._on_speed = np.zeros(self.settings.N)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the programs, which are built again."""
-        return {**self.__dict__, "_programs": {}}
+        """Everything but the programs, which are built again, and the thread, which may be another."""
+        return {**self.__dict__, "_programs": {}, "_thread": {}}
+
+    def check_thread(self) -> None:
+        """Raise SolverError in any thread but the first one that called this."""
+        if self._thread.setdefault("first", get_ident()) != get_ident():
+            raise SolverError(
+                "this controller belongs to another thread; build one in each thread"
+            )
+
+    def begin(self, began: float) -> None:
+        """Start to measure the time of a step, which by the clock on the wall `began` earlier [s]."""
+        self._began = began
+        self._computed = thread_time()
+
+    @property
+    def is_late(self) -> bool:
+        """True if the time of the step is used up."""
+        s = self.settings
+        taken = perf_counter() - self._began
+        if taken > s.deadline:
+            return True
+        return taken > s.time_limit and thread_time() - self._computed > s.time_limit
 
     def plan(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, from a `guess`, shape (N, 2) [m/s2].
@@ -411,7 +399,7 @@ class Planner:
                 self._programs.clear()
             program = Program(self.settings, key[1:], has_floors)
             self._programs[key] = program
-            self.budget.extend()
+            self._computed = thread_time()  # this is done once for each size
         program.take(groups)
         given = program.given
         given[:4], given[4:6], given[6:] = question[:3]
@@ -428,7 +416,7 @@ class Planner:
             solved = program.solve()
             if solved is None:
                 self._on_speed[:] = 0.0
-                timed_out = self.budget.is_spent
+                timed_out = self.is_late
                 return Plan(program.inputs.copy(), inf, (inf,), True, timed_out)
             step, is_relaxed = solved
             if before is not None and step @ before < -(before @ before) / 2:
@@ -436,7 +424,7 @@ class Planner:
             before = step
             program.inputs += step.reshape(-1, 2)
             is_converged = hypot(*step.tolist()) <= CONVERGED
-            timed_out = not is_converged and self.budget.is_spent
+            timed_out = not is_converged and self.is_late
             if is_converged or timed_out:
                 break
         self._on_speed[:] = program.multipliers

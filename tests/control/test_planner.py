@@ -15,7 +15,7 @@ from studies.ipopt import ByIpopt
 import szlib
 from szlib.control import Body, HalfPlane, Obstacles, Priority, Wall, Zone, mpc, planner
 from szlib.control.controller import advance
-from szlib.control.planner import Planner, Program, TimeBudget
+from szlib.control.planner import Planner, Program
 from szlib.control.problem import Question, list_conditions
 from szlib.control.settings import TOLERANCE
 
@@ -522,13 +522,13 @@ def test_time_is_up_by_both_clocks(monkeypatch, wall, thread, is_spent):
     clocks = {"perf_counter": 100.0, "thread_time": 7.0}
     for name in clocks:
         monkeypatch.setattr(planner, name, lambda name=name: clocks[name])
-    budget = TimeBudget(0.5)
-    assert not budget.is_spent
+    budget = Planner(szlib.MPCSettings(time_limit=0.5))
+    assert not budget.is_late
     clocks["perf_counter"] += wall
     clocks["thread_time"] += thread
-    assert budget.is_spent == is_spent
+    assert budget.is_late == is_spent
     budget.begin(clocks["perf_counter"])
-    assert not budget.is_spent
+    assert not budget.is_late
 
 
 def tick(monkeypatch: Any, seconds: float) -> None:
