@@ -263,13 +263,10 @@ class Person:
         """The same person, `seconds` later, as predicted, but no farther from the origin than `LARGEST`."""
         if not seconds or (self.stands and self.prediction is None):
             return self
-        position = self.position + seconds * np.array(self.velocity)
-        prediction = self.prediction
-        if prediction is not None:
-            position += prediction.sample(self, np.array([seconds]))[0, :2]
-            prediction = prediction.later(seconds)
-        person = self.at(position.clip(-LARGEST, LARGEST))
-        vars(person).update(prediction=prediction)
+        ((place,),) = find_places([self], np.array([seconds]))
+        person = self.at(place.clip(-LARGEST, LARGEST))
+        if self.prediction is not None:
+            vars(person).update(prediction=self.prediction.later(seconds))
         return person
 
     def at(self, position: ArrayLike) -> Person:

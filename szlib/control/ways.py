@@ -169,9 +169,9 @@ class Map:
         ends = ends[np.isfinite(ends).all(axis=1)]
         low = np.maximum(ends.min(axis=0), points.min(axis=0) - _FARTHEST_WALL)
         high = np.minimum(ends.max(axis=0), points.max(axis=0) + _FARTHEST_WALL)
-        self._middle = (low + high) / 2
+        self._low = low
+        self._high = high
         size = high - low
-        self._reach = size / 2
         side = min(CELL, max(SMALLEST_CELL, clearance / _MOST_SHARE))
         # so that MOST_CELLS = (size[0] / cell + 2 _MARGIN) (size[1] / cell + 2 _MARGIN)
         most = MOST_CELLS - 4 * _MARGIN**2
@@ -221,7 +221,7 @@ class Map:
 
     def holds(self, points: Array) -> bool:
         """True if these `points` lie within the map."""
-        return bool((np.abs(points - self._middle) < self._reach).all())
+        return bool(((self._low < points) & (points < self._high)).all())
 
     def locate(self, points: Array) -> tuple[Cells, Cells]:
         """The cells of `points`, shape (..., 2), as two indices; beyond the map the nearest one."""
@@ -315,10 +315,15 @@ class WayFinder:
             self._goal = goal
             if self._is_loose:
                 self._map = None
-        m = self._get_map(at, goal)
+        points = np.array([at, goal])
+        m = self._map
+        if m is None or not m.holds(points):
+            m = self._make_map(points)
         is_searched = not self._steps or len(people) != self._n_people
         if is_searched:
-            m = self._loosen(m, at, goal)
+            # a robot may fit where the centres of cells are too near to walls
+            if not (self._is_loose or m.links(points)):
+                m = self._make_map(points, slack=0.5)
             self._search(m, at, goal, Surroundings(people, zones, at, m, self._s))
             self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
             self._n_people = len(people)
@@ -327,26 +332,14 @@ class WayFinder:
         length = heading.length if m.is_reached else inf
         return Heading(heading.target, length, tuple(self._ways), is_searched)
 
-    def _get_map(self, at: Point, goal: Point) -> Map:
-        """The map that holds these points."""
-        points = np.array([at, goal])
-        if self._map is None or not self._map.holds(points):
-            self._map = self._make_map(points)
-        return self._map
-
     def _make_map(self, points: Array, slack: float = 0.0) -> Map:
+        """A new map that holds these `points`, with this `slack`."""
         self._is_loose = slack > 0
         self._standing = None
         self._steps = 0
         clearance = self._s.r_robot + self._s.eps
-        return Map(self._fixed, points, clearance, slack)
-
-    def _loosen(self, m: Map, at: Point, goal: Point) -> Map:
-        """The map `m`; if it does not link these places, one with half a cell of slack."""
-        points = np.array([at, goal])
-        if not (self._is_loose or m.links(points)):
-            m = self._map = self._make_map(points, slack=0.5)
-        return m
+        self._map = Map(self._fixed, points, clearance, slack)
+        return self._map
 
     def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
         """Find the ways anew, and choose one."""
