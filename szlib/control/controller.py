@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.checks import Array
-from ..core.errors import SolverError
 from .obstacles import Path
 from .people import Person, check_finite
 from .settings import MPCSettings, check_argument
@@ -220,7 +219,6 @@ class StepClock:
     ----------
     now : time of the present step [s].
     has_begun : True if a control was commanded.
-    fault : what is wrong with the times of this step, in words; "" if nothing is.
     """
 
     def __init__(self, dt: float) -> None:
@@ -228,7 +226,6 @@ class StepClock:
         self.has_begun = False
         self._dt = dt
         self._elapsed = dt
-        self.fault = ""
         self._called = 0.0
         self._held = deque[tuple[Array, float]](maxlen=100 * ceil(OLDEST_STATE / dt))
         self._periods = deque[float](maxlen=RATE_STEPS)
@@ -237,14 +234,13 @@ class StepClock:
         self._remaining = inf
         self._waited = 0.0
 
-    def tick(self, now: float | None, stamps: ArrayLike | None, memory: float) -> None:
-        """Begin a step.
+    def tick(self, now: float | None, stamps: ArrayLike | None) -> list[str]:
+        """Begin a step: what is wrong with its times, in words.
 
         Parameters
         ----------
         now : time of the step [s]; None: `dt` after the last, which no `stamps` can refer to.
         stamps : when people were measured [s].
-        memory : time for which a tracker remembers people [s].
         """
         is_timed = now is None
         last = self.now
@@ -266,19 +262,7 @@ class StepClock:
             self._held.append((self._control, self._elapsed))
             self._periods.append(called - self._called if is_timed else self._elapsed)
         self._called = called
-        if stamps is not None:
-            try:
-                late = np.abs(np.asarray(stamps, float) - self.now).max(initial=0.0)
-            except (TypeError, ValueError, OverflowError) as error:
-                expected = "one time [s], or one for each person"
-                raise SolverError(
-                    f"stamps must be {expected}; got {stamps!r:.200}"
-                ) from error
-            if late > memory:
-                faults.append(
-                    f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s only"
-                )
-        self.fault = "; ".join(faults + self._check_rate(is_timed))
+        return faults + self._check_rate(is_timed)
 
     def _check_rate(self, is_timed: bool) -> list[str]:
         """What is wrong with the rate of the steps, by `now` or, if it `is_timed`, by a clock of our own."""

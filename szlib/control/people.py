@@ -304,11 +304,13 @@ class TrackedPeople(NamedTuple):
     unknown : number of rejected people of whom nothing is known that could take the place of the
         measurement. They are among `people`, as standing where they were measured, only if that position can
         be used.
+    late : greatest time between a measurement and now [s].
     """
 
     people: tuple[Person, ...]
     rejected: int = 0
     unknown: int = 0
+    late: float = 0.0
 
 
 class Tracker:
@@ -415,7 +417,8 @@ class Tracker:
         for name, (person, time) in self._last_seen.items():
             if name not in given:
                 present.append(person.after(now - time))
-        return TrackedPeople(tuple(present), rejected, unknown)
+        late = max([abs(now - time) for time in times], default=0.0)
+        return TrackedPeople(tuple(present), rejected, unknown, late)
 
     def _set_clock(self, now: float) -> None:
         """Begin a step at the time `now`: forget people; if the clock went back, so do their times."""
