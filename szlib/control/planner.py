@@ -386,7 +386,7 @@ class Planner:
         return plan
 
     def prepare(self, question: Question, has_floors: bool) -> Program:
-        """The program of a `question`; `has_floors` as of `LinearProblem`."""
+        """The program of a `question`; `has_floors` as of `list_conditions`."""
         obstacles = question.barriers
         if has_floors:
             bodies = find_bodies(obstacles, self.settings, as_predicted=True)

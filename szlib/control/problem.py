@@ -143,7 +143,10 @@ def list_conditions(
 def linearise_kind(
     settings: MPCSettings, kind: Any, has_floors: bool, n: int, count: int
 ) -> Any:
-    """(positions, numbers and offsets) -> (bounds, slopes) of all conditions on `n` obstacles of a kind."""
+    """(positions, numbers and offsets) -> (bounds, slopes) of all conditions on `n` obstacles of a `kind`.
+
+    Each has `count` numbers; `settings` and `has_floors` as of `list_conditions`.
+    """
     if n > 1:
         of_one = linearise_kind(settings, kind, has_floors, 1, count)
         return of_one.map(n, [True, False], [False, False])
@@ -172,7 +175,7 @@ _MOST_CURVED = 1e3
 
 @lru_cache
 def linearise_motion(settings: MPCSettings) -> Any:
-    """The part of a quadratic program without obstacles: see `planner.Program`."""
+    """The part of a quadratic program without obstacles, for these `settings`: see `planner.Program`."""
     s = settings
     n = s.N
     inputs = ca.SX.sym("u", 2, n)
@@ -223,7 +226,7 @@ def linearise_motion(settings: MPCSettings) -> Any:
 
 
 def bind(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> Any:
-    """A call of a CasADi function on fixed arrays, and what must live as long.
+    """A call of a CasADi `function` on fixed `arguments` and `results`, and what must live as long.
 
     It saves the conversions of an ordinary call, which take ten times as long as these functions.
     """
