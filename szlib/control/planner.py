@@ -67,12 +67,12 @@ HARD_PRICE = 1e5
 # Rows of obstacles with a larger value are left out of an iteration [m].
 NEAR = 1.0
 _MOST_UNFILTERED = 24  # with at most so many obstacles, a problem contains all of them
-_FIRST_MARGIN = (
-    0.5  # a problem contains what is so much farther than what can matter [m]
-)
-_MULTIPLE = (
-    16  # and this number of zones and walls, or a multiple: few sizes of problems
-)
+# A problem contains what is so much farther than what can matter [m], and this number of zones and of walls,
+# or a multiple: few sizes of problems.
+_FIRST_MARGIN = 0.5
+_MULTIPLE = 16
+_FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
+_EVERY = slice(None)
 _MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 # DAQP's answers; the second one if it violates rows with a price
@@ -211,13 +211,15 @@ class Program:
 
         None if nothing satisfies the rows that are always there.
         """
-        is_near = self.lower > -NEAR
-        is_near[: self.first] = True
-        rows = np.flatnonzero(is_near)
+        rows: Any = _EVERY
+        if len(self.levels) > _FEW_ROWS:
+            is_near = self.lower > -NEAR
+            is_near[: self.first] = True
+            rows = np.flatnonzero(is_near)
         found = self._solve_rows(rows, self.lower, self.prices)
         is_relaxed = found is None or (found[2] and self._is_hard)
         if found is None:
-            found = self._solve_levels(rows)
+            found = self._solve_levels(np.arange(len(self.lower))[rows])
         if found is None:
             return None
         n = len(self.gradient)
@@ -225,26 +227,30 @@ class Program:
         return found[0], is_relaxed
 
     def _solve_rows(
-        self, rows: NDArray[np.intp], lower: Array, prices: Array
+        self, rows: Any, lower: Array, prices: Array
     ) -> tuple[Array, Array, bool] | None:
         """d, the multipliers of the rows, and whether rows with a price are violated.
 
         Of the problem it has these rows, with other lower bounds and prices; those with a price are soft.
-        None if hard rows contradict each other.
+        None if hard rows contradict each other. To change a model of DAQP takes half the time of a new one,
+        and its answers are the same; the number of rows with a price must not change, because it sizes the
+        memory.
         """
         weights = prices[rows]
         slopes = self.slopes[rows][len(self.gradient) :]
         given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
         sense = np.where(weights > 0, _SOFT, self._sense[rows])
-        size = len(weights), np.count_nonzero(weights)
+        size = None if rows is _EVERY else (len(weights), np.count_nonzero(weights))
         model = self._models.pop(size, None)
         if model is None:
             model = daqp.Model()
             model.settings = _DAQP
             flag, _ = model.setup(*given, sense)
+            model.soft_weights(w_l=weights, w_u=weights)
         else:
             flag = model.update(*given, sense)
-        model.soft_weights(w_l=weights, w_u=weights)
+            if size:  # all rows together always have the same prices
+                model.soft_weights(w_l=weights, w_u=weights)
         if flag < 0:
             return None
         step, _, flag, info = model.solve()
