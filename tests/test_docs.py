@@ -187,7 +187,7 @@ def test_the_five_results_are_those_of_the_tables():
         )
     ]
     held, draws = (int(in_front[name].sum()) for name in ("held", "draws"))
-    assert f"in {held} of {draws} zones of that day" in text
+    assert f"in {held} of {draws} resamples of that day" in text
     stays = cells.loc["The robot remains within the safety set."].reset_index()
     papers, code = (
         stays[stays["condition"] == name]
@@ -195,10 +195,10 @@ def test_the_five_results_are_those_of_the_tables():
     )
     zones = papers.groupby("source")["draws"].max().sum()
     assert (papers["held"] == papers["draws"]).all() and code["held"].sum() == 0
-    assert (
-        f"keeps out of all {zones} zones; with the gamma of the paper's code, 0.4, of none"
-        in text
-    )
+    drawn = papers.groupby("source")["draws"].max()
+    assert f"keeps out of all {zones} zones ({drawn['plazas']} plazas" in text
+    assert f"{zones - drawn['plazas']} resamples) with our gamma, 0.05;" in text
+    assert "with 0.4, that of the paper's code, of none" in text
 
     rule = table("03_outliers").query(
         "intruders == 0.0025 and rule == '0.2 %, 20 neighbours'"

@@ -183,9 +183,11 @@ class Map:
         covered = self._cover(fixed, slack * self.cell)[2:-2, 2:-2]
         self.free = np.pad(~covered | covered.all(), 2)
         self.blocked = ~self.free
-        open_ = np.pad(~covered, 2, constant_values=True)  # beyond the map as well
+        n = ceil(2 * _DOOR / self.cell)
+        open_ = np.pad(~covered, 2 + n, constant_values=True)  # beyond the map as well
         wide = distance_transform_edt(open_) * self.cell >= _DOOR
-        self.is_narrow = self.free & (distance_transform_edt(~wide) * self.cell > _DOOR)
+        narrow = distance_transform_edt(~wide) * self.cell > _DOOR
+        self.is_narrow = self.free & narrow[n:-n, n:-n]
         self._parts, _ = label(self.free, np.ones((3, 3)))
         # pairs of free neighbours, in 16 directions
         numbers = np.flatnonzero(self.free)

@@ -613,3 +613,13 @@ def test_each_solver_package_is_imported_by_its_modules_only():
             if re.search(rf"^\s*(import|from) {package}\b", text, re.MULTILINE):
                 where.add(file.stem)
     assert found == {"casadi": {"problem"}, "daqp": {"planner"}}
+
+
+def test_settings_and_walls_cannot_be_changed_in_silence():
+    controller = szlib.MPCCBF(ZONE, walls=[[(0, 3), (5, 3)]])
+    with pytest.raises(AttributeError):
+        controller.settings = szlib.MPCSettings(v_max=0.3)
+    with pytest.raises(ValueError, match="read-only"):
+        controller.walls[0, 0] = 1.0
+    with pytest.raises(szlib.SolverError, match="settings must be MPCSettings"):
+        szlib.MPCCBF(ZONE, settings={})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Sequence
+from math import hypot
 from pathlib import Path as File
 from typing import Any
 
@@ -542,6 +543,26 @@ def test_something_that_is_no_obstacle_is_refused():
             szlib.MPCCBF(ZONE, obstacles=[wrong])
     with pytest.raises(szlib.SolverError, match=r"numbers of a table must be finite"):
         szlib.MPCCBF(ZONE, obstacles=[Table(0.0, np.nan, 1.0)])
+
+
+@pytest.mark.parametrize(
+    "distance",
+    [
+        lambda x, y, t, px: hypot(x - px, y),
+        lambda x, y, t, px: max(x - px, y),
+        lambda x, y, px: x - px,
+    ],
+)
+def test_a_distance_that_is_no_formula_is_refused_with_advice(distance):
+    kind = type("Odd", (Obstacle,), {"distance": staticmethod(distance)})
+    with pytest.raises(szlib.SolverError, match=r"odd \(5\): .* by operators only"):
+        szlib.MPCCBF(ZONE, obstacles=[kind(5.0)])
+
+
+@pytest.mark.parametrize("obstacles", [None, HalfPlane((0.0, 0.0), (0.0, 1.0))])
+def test_obstacles_must_be_a_list(obstacles):
+    with pytest.raises(szlib.SolverError, match="obstacles must be a list"):
+        szlib.MPCCBF(ZONE, obstacles=obstacles)
 
 
 def test_an_obstacle_is_restored_from_its_kind_and_numbers():

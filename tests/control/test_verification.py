@@ -192,6 +192,17 @@ def test_a_false_claim_of_a_step_is_reported_as_a_fault(lie):
     assert "WRONG" in LIES[lie](step).explain()
 
 
+def test_a_lie_is_found_far_from_the_origin_as_well():
+    """At the coordinates of a national grid."""
+    x, y = 5e5, 5.6e6
+    controller = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(r_robot=0.3))
+    person = [x + 1.3, y + 0.3, -0.8, 0.0]
+    step = controller.step((x, y, 0.5, 0.0), (x + 6.0, y), [person])
+    assert step.verify().ok
+    for change in ({"control": step.control + 0.01}, {"inputs": step.inputs + 0.01}):
+        assert not replace(step, **change).verify().ok
+
+
 def test_a_plan_out_of_bounds_is_reported_as_a_fault():
     step = controller_of().step((-4, 0, 0.3, 0), GOAL, [FACING])
     faults = replace(step, inputs=np.add(step.inputs, (3.0, 0.0))).verify().faults

@@ -33,6 +33,7 @@ from szlib.control.ways import (
     GROUP_SECOND,
     GROUP_SPEED,
     MOST_CELLS,
+    SMALLEST_CELL,
     SWITCH_GAIN,
     ZONE_SECOND,
     Heading,
@@ -345,6 +346,61 @@ def test_a_goal_that_moved_a_little_is_reached():
     drive(controller, (3.0, 0.0), 5)
     steps = drive(controller, (3.0, 0.3), 150)
     assert np.hypot(*(steps[-1].predicted[0, :2] - (3.0, 0.3))) < 0.05
+
+
+def test_a_goal_that_moved_to_the_other_side_of_a_wall_is_reached() -> None:
+    small = szlib.MPCSettings.among_people(r_robot=0.1, time_limit=np.inf)
+    controller = szlib.MPCCBF(ZONE, walls=[[(-2, 0), (6, 0)]], settings=small)
+    *_, last = drive(controller, (1.0, -0.2), 10, start=(0.0, -0.25, 0.0, 0.0))
+    *_, last = drive(controller, (1.0, 0.2), 200, start=last.scene.state)
+    assert np.hypot(*(last.predicted[0, :2] - (1.0, 0.2))) < 0.05
+
+
+def test_a_goal_that_moved_out_of_a_solid_is_blocked_no_more() -> None:
+    controller = szlib.MPCCBF(ZONE, walls=shapely.box(2, -1, 4, 1), settings=AMONG)
+    start = (0.0, 0.0, 0.0, 0.0)
+    assert controller.step(start, (3.0, 0.95)).goal_blocked
+    *_, last = drive(controller, (3.0, 1.42), 10, start=start)
+    assert (
+        not last.goal_blocked and last.way != "to the nearest point that it can reach"
+    )
+
+
+def make_slit(width: float, door: bool) -> list[Any]:
+    """A room with a slit of this `width`, and perhaps a `door` of 1 m."""
+    ends = [(-6, -5), (-4, -width / 2)] if door else [(-6, -width / 2)]
+    middle = [[(3, a), (3, b)] for a, b in (*ends, (width / 2, 6))]
+    return [[(-3, -6), (9, -6), (9, 6), (-3, 6), (-3, -6)], *middle]
+
+
+def test_an_earlier_goal_in_a_wall_does_not_close_a_door() -> None:
+    controller = szlib.MPCCBF(ZONE, walls=make_slit(0.66, door=True), settings=AMONG)
+    *_, last = drive(controller, (3.0, 3.0), 60, start=(0.0, 0.0, 0.0, 0.0))
+    *_, last = drive(controller, (6.0, 0.0), 200, start=last.scene.state)
+    assert np.hypot(*(last.predicted[0, :2] - (6.0, 0.0))) < 0.05
+
+
+@pytest.mark.parametrize("width", [0.62, 0.66, 0.72, 0.76])
+@pytest.mark.parametrize("y", [0.0, 0.13, 0.3, 0.5])
+def test_a_door_is_a_way_if_the_robot_fits(width: float, y: float) -> None:
+    """It needs 0.7 m, wherever the cells of the map lie."""
+    walls = make_slit(width, door=False)
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG)
+    step = controller.step((0.0, y, 0.0, 0.0), (6.0, y))
+    assert step.goal_blocked == (width < 0.7)
+
+
+def test_the_free_end_of_a_wall_is_no_door() -> None:
+    for half in (4, 9, 12):
+        walls = [[(3, -half), (3, half)]]
+        step = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG).step(START, (6.0, 0.0))
+        assert step.way == "around obstacles"
+
+
+def test_cells_of_a_tiny_robot_are_not_smaller_than_can_be_searched() -> None:
+    fixed = Obstacles((), 0.0)
+    found = Map(fixed, np.array([(0.0, 0.0), (6.0, 0.0)]), clearance=0.02)
+    assert found.cell == SMALLEST_CELL
 
 
 def test_a_goal_that_walks_away_leaves_the_map() -> None:
