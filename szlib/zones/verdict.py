@@ -37,7 +37,7 @@ FARTHEST_CENTER = 0.25
 # Widest interval of a semi-axis, as a share of it.
 WIDEST = 0.6
 # How much nearer than they are two people seem where positions are dt apart, divided by dt^2, in one pair of
-# 20 [m/s2] (measured on THOR-MAGNI, recorded every 0.4 s: 3, 7 and 10 cm with 0.5, 0.8 and 1 s).
+# 20 [m/s2] (measured on THOR-MAGNI, notebook 06: 3, 7 and 10 cm with 0.5, 0.8 and 1 s).
 HIDDEN = 0.1
 FEWEST_POSITIONS = (
     12  # of a track (measured: plazas of which one position every 0.3 s is left)
