@@ -54,7 +54,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import plots
 from IPython.display import Markdown
-from scipy.stats import binomtest
 from studies import coarse, collision, quantile_zone, real_day, respect, shifted_pair
 
 import szlib
@@ -216,6 +215,8 @@ even by chance. The data has {test.statistic:.1f}. {"So people do not pass each 
 
 # %% jupyter={"source_hidden": true}
 # Checks
+from scipy.stats import binomtest
+
 nobody = record.committed_table("06_nobody", respect.recompute_nobody, where="radius > 0")
 nobody["alarm"] = nobody["p_value"] <= 0.05
 alarms = nobody.groupby(["kinds", "bunch"])["alarm"].agg(["sum", "size"])
