@@ -564,8 +564,10 @@ recording.open_live()
 # %% jupyter={"source_hidden": true}
 # The answer
 low = {(row["gamma"], row["n_h"]): row["least_h"] for row in recording.table}
+need = {g: [n for n in (1, 2, 8) if low[g, n] >= 0] for g in (0.05, 0.2, 0.8)}
+fewest = "; ".join(f"{n[0] if n else 'none'} with gamma = {g:g}" for g, n in need.items())
 Markdown(
-    "<details><summary>Answer</summary>\n\nThe least h, with $N_h$ = 1, 2 and 8, is "
+    f"<details><summary>Answer</summary>\n\nThe fewest of 1, 2 and 8 steps that keep h >= 0: {fewest}. The least h, with $N_h$ = 1, 2 and 8, is "
     + "; ".join(
         f"{', '.join(f'{low[g, n]:.2f}' for n in (1, 2, 8))} m with gamma = {g:g}" for g in (0.05, 0.2, 0.8)
     )
