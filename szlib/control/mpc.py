@@ -268,11 +268,6 @@ class MPCCBF(Controller):
         age = check_number("state_age", state_age)
         x, towards = self._locate(state, check_point("goal", goal), age)
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
-        if tracked.late > self.tracker.memory:
-            faults.append(
-                f"people were measured {tracked.late:.3g} s from now, and are remembered for "
-                f"{self.tracker.memory:g} s only"
-            )
         scene = self._make_scene(x, towards, tracked, is_point=True)
         heading = self._choose_heading(scene)
         remaining = heading.length if heading.length < inf else dist(x[:2], towards)
@@ -291,7 +286,7 @@ class MPCCBF(Controller):
             way_length=heading.length,
             ways=heading.ways,
             stuck=clock.time_without_progress(remaining, towards),
-            clock="; ".join(faults),
+            clock="; ".join(filter(None, [*faults, tracked.fault])),
         )
         clock.hold(step.control)
         return step

@@ -304,13 +304,13 @@ class TrackedPeople(NamedTuple):
     unknown : number of rejected people of whom nothing is known that could take the place of the
         measurement. They are among `people`, as standing where they were measured, only if that position can
         be used.
-    late : greatest time between a measurement and now [s].
+    fault : what is wrong with the times of measurements, in words; "" if nothing is.
     """
 
     people: tuple[Person, ...]
     rejected: int = 0
     unknown: int = 0
-    late: float = 0.0
+    fault: str = ""
 
 
 class Tracker:
@@ -418,7 +418,13 @@ class Tracker:
             if name not in given:
                 present.append(person.after(now - time))
         late = max([abs(now - time) for time in times], default=0.0)
-        return TrackedPeople(tuple(present), rejected, unknown, late)
+        fault = ""
+        if late > self.memory:
+            fault = (
+                f"people were measured {late:.3g} s from now, and are remembered for "
+                f"{self.memory:g} s only"
+            )
+        return TrackedPeople(tuple(present), rejected, unknown, fault)
 
     def _set_clock(self, now: float) -> None:
         """Begin a step at the time `now`: forget people; if the clock went back, so do their times."""
