@@ -739,7 +739,7 @@ atc, central = (sites.loc[(site, "strangers")] for site in ("atc-1hz", "grand-ce
 both = [f"{each['radius_low']:.2f} to {each['radius_high']:.2f} m" for each in (atc, central)]
 apart = max(atc["radius_low"], central["radius_low"]) > min(atc["radius_high"], central["radius_high"])
 lost_below = 0.9  # the tracker of the ATC day loses people who are nearer to each other (06) [m]
-may_be_tracker = atc["radius_low"] < lost_below
+may_be_tracker = bool(atc["radius_low"] < lost_below)
 record.claim(
     "strangers keep different distances at the ATC mall and at Grand Central",
     None if may_be_tracker else apart,

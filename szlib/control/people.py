@@ -374,24 +374,7 @@ class Tracker:
         """
         now = check_finite("now", now)
         self._set_clock(now)
-        listed: Any = people
-        try:
-            if not isinstance(people, (list, tuple)):
-                listed = np.ma.filled(np.asanyarray(people, float), np.nan).tolist()
-            names = [getattr(each, "id", None) for each in listed]
-            names = names if ids is None else list(ids)
-            given = Counter(names)
-            times = [now] * len(listed)
-            if stamps is not None:
-                times = np.full(len(listed), stamps, float).tolist()
-            rows = zip(listed, names, times, strict=True)
-            measured = [(*self._read(each, name), name, t) for each, name, t in rows]
-        except (TypeError, ValueError, OverflowError) as error:
-            raise SolverError(
-                "people must be Persons, or numbers of shape (n, 4): x, y, vx, vy; ids must be a list of "
-                "hashable values, one for each; stamps must be one time [s], or one for each; got "
-                f"{people!r:.200}, {ids!r:.200}, {stamps!r:.200}: {error}"
-            ) from error
+        measured, given = self._list_measurements(people, now, ids, stamps)
         present = []
         rejected = 0
         unknown = 0
@@ -417,7 +400,7 @@ class Tracker:
         for name, (person, time) in self._last_seen.items():
             if name not in given:
                 present.append(person.after(now - time))
-        late = max([abs(now - time) for time in times], default=0.0)
+        late = max([abs(now - time) for *_, time in measured], default=0.0)
         fault = ""
         if late > self.memory:
             fault = (
@@ -425,6 +408,36 @@ class Tracker:
                 f"{self.memory:g} s only"
             )
         return TrackedPeople(tuple(present), rejected, unknown, fault)
+
+    def _list_measurements(
+        self,
+        people: People,
+        now: float,
+        ids: Iterable[Hashable] | None,
+        stamps: ArrayLike | None,
+    ) -> tuple[list[Any], Counter[Hashable]]:
+        """Of each measurement the person, whether it can be used, name and time; how often a name is given.
+
+        `people`, `now`, `ids` and `stamps` are as of `see`.
+        """
+        listed: Any = people
+        try:
+            if not isinstance(people, (list, tuple)):
+                listed = np.ma.filled(np.asanyarray(people, float), np.nan).tolist()
+            names = [getattr(each, "id", None) for each in listed]
+            names = names if ids is None else list(ids)
+            times = [now] * len(listed)
+            if stamps is not None:
+                times = np.full(len(listed), stamps, float).tolist()
+            rows = zip(listed, names, times, strict=True)
+            measured = [(*self._read(each, name), name, t) for each, name, t in rows]
+            return measured, Counter(names)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise SolverError(
+                "people must be Persons, or numbers of shape (n, 4): x, y, vx, vy; ids must be a list of "
+                "hashable values, one for each; stamps must be one time [s], or one for each; got "
+                f"{people!r:.200}, {ids!r:.200}, {stamps!r:.200}: {error}"
+            ) from error
 
     def _set_clock(self, now: float) -> None:
         """Begin a step at the time `now`: forget people; if the clock went back, so do their times."""
