@@ -318,21 +318,20 @@ class Step:
         return verify_step(self)
 
     def __repr__(self) -> str:
-        safe = "safe" if self.safe else "not safe"
-        control = self._units.format(*self.control)
-        found = f"{self.status}, {safe}, control={control}, min h={self.h.min(initial=inf):.3g} m"
-        return f"{type(self).__name__}({found})"
+        return (
+            f"{type(self).__name__}({self.status}, {'safe' if self.safe else 'not safe'}, "
+            f"control={self._units.format(*self.control)}, min h={self.h.min(initial=inf):.3g} m)"
+        )
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified: what happened, and what would help."""
         scene = self.scene
-        control = self._units.format(*self.control)
         report = self.verify()
         danger = self._find_danger()
         verdict = f"not safe: {danger}" if danger else "safe"
         lines = [
             f"Step: {_MEANING[self.status]}; {verdict}",
-            f"  control {control} after {1e3 * self.solve_time:.2g} ms",
+            f"  control {self._units.format(*self.control)} after {1e3 * self.solve_time:.2g} ms",
         ]
         if len(self.h):
             i = int(np.argmin(self.h))
