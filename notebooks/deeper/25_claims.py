@@ -680,7 +680,8 @@ costs = pd.DataFrame({key: [np.median(values)] for key, values in solve_times.it
 for solver, cost in costs.items():
     factor = float(cost[paper.N] / cost[2])
     name = f"a step with N_h = {paper.N} takes longer than with N_h = 2 ({solver})"
-    record.claim(name, factor > 1, f"{factor:.2f} times as long")
+    decided = None if abs(factor - 1) < 0.05 else factor > 1  # clocks are not better
+    record.claim(name, decided, f"{factor:.2f} times as long")
 longest = max(solve_times["ipopt", paper.N_h])
 record.claim("each step with IPOPT takes less than 0.1 s", longest < 1000 * paper.dt, f"{longest:.0f} ms")
 costs.loc[[1, 2, 4, 8]].rename_axis(index="N_h", columns="median time of a step [ms]").round(2)
