@@ -166,7 +166,7 @@ Markdown(
     "<details><summary>Answer</summary>\n\nThe robot slows down where its limit "
     r"$\gamma h / \Delta t$ becomes smaller than the speed that it wants: at $h = v\,\Delta t / \gamma$. For 1 m/s that is "
     + ", ".join(f"{start:.1f} m with gamma = {share:g}" for share, start in starts.items())
-    + ". Where that is farther than the start, it is slow from the start. All of them approach the same place, the edge of "
+    + ". If this distance is larger than the first h, the robot is slow from the start. All of them approach the same place, the edge of "
     f"the zone; with gamma = {min(starts):g} that takes longer than the figure shows. Gamma sets **when** the robot slows down, "
     "not how near it comes.\n\n</details>"
 )

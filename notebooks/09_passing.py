@@ -294,7 +294,7 @@ for name, scene in szlib.SCENARIOS.items():
 # %% jupyter={"source_hidden": true}
 # Figure
 styles = ("o-", figures.BLUE), ("s--", figures.ORANGE), ("^-.", figures.GREEN), ("D:", figures.BLACK)
-titles = "Too small is slow", "Too large comes near", "Both ends lack plans"
+titles = "Too small is slow", "Too large comes near", "Very small and very large: no plan"
 fig, panels = plt.subplots(1, 3, figsize=(12, 3.9), layout="constrained")
 for ax, (key, label), title in zip(panels, columns.items(), titles, strict=True):
     for (name, table), (line, colour) in zip(sweep.items(), styles, strict=True):

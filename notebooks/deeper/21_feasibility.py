@@ -621,7 +621,7 @@ failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]].rename(
 # | random command lines: odd names, places, values, numbers | 1,000 | none hangs, shows a foreign traceback, or changes other files |
 # | damaged results; disks full at each write; clocks that jump | 1,200; 23; 40 | all repaired or refused |
 # | `extract` and `run` killed at random moments | 100 | identical bytes after a restart, no process left |
-# | a search for worlds in which the robot touches a wall | 20,000 | no wall was touched; it broke two claims of steps, which were then mended |
+# | a search for worlds in which the robot touches a wall | 20,000 | no wall was touched; the search found two false claims of steps, and the code was corrected |
 
 # %% jupyter={"source_hidden": true}
 # What we know now

@@ -485,7 +485,7 @@ did = ", ".join(f"{name} ({total[name]})" for name in MOTION_CHANGES if total[na
 Markdown(
     f"**Differential drive**, {int(turning['worlds']):,} random worlds: {arrive}, {later}.\n\n"
     f"**All crowds**, with each of the settings of MPC-CBF: {total['trials']:,} trials. Of {of_all[3:]}, "
-    f"{total['broken_steps']} led to h < 0. What the people had done before, each person of a step counted: {did}."
+    f"{total['broken_steps']} led to h < 0. What the people had done before, counted once for each person and step: {did}."
 )
 
 # %% jupyter={"source_hidden": true}

@@ -1,9 +1,9 @@
 """How much nearer two people seem where positions are far apart in time: `python -m studies.coarse`.
 
 Writes 06_coarse.csv.  A path is straight between two positions, so somebody who steps aside between them seems nearer to
-the other.  Of each track one position every so often is left, and the nearest approach of each pair is compared with that
+the other.  Of each track one position every `every` seconds is kept, and the nearest approach of each pair is compared with that
 of the whole track.  THOR-MAGNI, recorded every 0.4 s, is looked for in $SZLIB_DATA_DIR (magni/); the people of the plaza
-turn more sharply.
+turn more sharply.  THOR-MAGNI's paths are straight between positions that are 0.4 s apart, so its numbers are lower bounds.
 """
 
 from __future__ import annotations

@@ -168,8 +168,10 @@ class MPCCBF(Controller):
 
     @property
     def walls(self) -> Array:
-        """The walls, shape (n, 2, 2) [m]; see `set_walls`."""
-        return self._segments
+        """The walls, shape (n, 2, 2), read-only [m]; see `set_walls`."""
+        segments = self._segments.view()
+        segments.flags.writeable = False
+        return segments
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -188,7 +190,6 @@ class MPCCBF(Controller):
 
     def _take_walls(self, walls: Any) -> None:
         self._segments, self._solids = read_walls(walls), find_solids(walls)
-        self._segments.flags.writeable = False
 
     def _take_obstacles(self, obstacles: Iterable[Obstacle]) -> None:
         """Build what is fixed, of the walls and these `obstacles`."""

@@ -251,7 +251,8 @@ class Obstacle:
     def check(self) -> None:
         """Raise SolverError if `distance` cannot be computed for many places at once."""
         try:
-            self.distance(*np.ones((3, 2)), *self.numbers)
+            with np.errstate(all="ignore"):
+                np.reshape(self.distance(*np.ones((3, 2)), *self.numbers), 2)
         except (TypeError, ValueError, NotImplementedError) as error:
             raise SolverError(
                 f"{self}: `distance` must be a formula of x, y, t and {len(self.numbers)} numbers, by "

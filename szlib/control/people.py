@@ -400,7 +400,7 @@ class Tracker:
         for name, (person, time) in self._last_seen.items():
             if name not in given:
                 present.append(person.after(now - time))
-        late = max([abs(now - time) for *_, time in measured], default=0.0)
+        late = float(np.nanmax([abs(now - time) for *_, time in measured] + [0.0]))
         fault = ""
         if late > self.memory:
             fault = (

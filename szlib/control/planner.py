@@ -30,8 +30,8 @@ then all levels are one quadratic program.
 
 *Method.* Each iteration linearises the rows at the plan. h is convex, so that a linearised floor implies the
 true one: an iteration with all rows satisfied keeps them, and lowers the cost (a convex-concave procedure:
-Yuille and Rangarajan, Neural Computation 15, 2003). So full steps are taken. Rows that cannot become active
-within the iteration, those with a value above `NEAR`, are left out.
+Yuille and Rangarajan, Neural Computation 15, 2003). So full steps are taken. Of many rows, those with a value
+above `NEAR` are left out; the next iteration has those that have come nearer.
 """
 
 from __future__ import annotations
@@ -333,7 +333,7 @@ class Planner:
             )
 
     def begin(self, began: float) -> None:
-        """Start to measure the time of a step, which by the clock on the wall `began` earlier [s]."""
+        """Start to measure the time of a step that began at `began`, by `perf_counter` [s]."""
         self._began = began
         self._computed = thread_time()
 
@@ -341,10 +341,10 @@ class Planner:
     def is_late(self) -> bool:
         """True if the time of the step is used up."""
         s = self.settings
-        taken = perf_counter() - self._began
-        if taken > s.deadline:
+        elapsed = perf_counter() - self._began
+        if elapsed > s.deadline:
             return True
-        return taken > s.time_limit and thread_time() - self._computed > s.time_limit
+        return elapsed > s.time_limit and thread_time() - self._computed > s.time_limit
 
     def plan(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, from a `guess`, shape (N, 2) [m/s2].

@@ -362,7 +362,7 @@ class Step:
             "zone_price=inf": s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
-            "v_max": self.walls_safe and not self.passively_safe,
+            "v_max": bool(scene.people) and not self.passively_safe,
             f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one": self.timed_out,
             f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
             "helps: another goal": self.asked.goal_blocked,
@@ -388,9 +388,11 @@ class Step:
         holding = np.flatnonzero(self.residual.min(axis=1, initial=inf) <= HOLDS)
         names = " and ".join(self.scene.name(i) for i in holding.tolist())
         s = self.scene.settings
-        away = dist(self.scene.state[:2], self.scene.goal)
         helps = "another goal" if s.decay_price < inf else "among_people()"
-        return f"{away:.1f} m from the goal; held by {names or 'nothing'}; what helps: {helps}"
+        return (
+            f"{dist(self.scene.state[:2], self.scene.goal):.1f} m from the goal; held by "
+            f"{names or 'nothing'}; what helps: {helps}"
+        )
 
     def _advise(self, row: Row) -> str:
         s = self.scene.settings

@@ -90,8 +90,9 @@ _WAITING = 0.8  # rest that is called waiting [s]
 _TIMES = np.linspace(0.0, 2 * SEARCH_TIME, 121)
 _TICK = float(_TIMES[1])
 
-# where free space is looked for, from a zone's centre to where the robot passes
+# where free space is looked for: from a zone's centre to where the robot passes; and across a way, in cells
 _BESIDE = np.linspace(0, 1, 20)
+_ACROSS = np.linspace(-1, 1, 33)[:, None, None]
 
 
 class Way(NamedTuple):
@@ -296,7 +297,6 @@ class WayFinder:
         self._fixed = fixed
         self._s = settings
         self._map: Map | None = None
-        self._is_loose = False
         self.reset()
 
     def reset(self) -> None:
@@ -307,6 +307,7 @@ class WayFinder:
         self._n_people = 0
         self._standing: Any = None
         self._measured = self._goal
+        self._loose: Map | None = None
 
     def find(
         self, at: Point, goal: Point, people: Sequence[Person], zones: Obstacles
@@ -315,17 +316,16 @@ class WayFinder:
         if dist(goal, self._goal) > _GOAL_MOVED:
             self.reset()
             self._goal = goal
-            if self._is_loose:
-                self._map = None
         points = np.array([at, goal])
-        m = self._map
+        m = self._loose or self._map
         if m is None or not m.holds(points):
-            m = self._make_map(points)
+            self._loose = None
+            m = self._map = self._make_map(points)
         is_searched = not self._steps or len(people) != self._n_people
         if is_searched:
             # a robot may fit where the centres of cells are too near to walls
-            if not (self._is_loose or m.links(points)):
-                m = self._make_map(points, slack=0.5)
+            if not (self._loose or m.links(points)):
+                m = self._loose = self._make_map(points, slack=0.5)
             self._search(m, at, goal, Surroundings(people, zones, at, m, self._s))
             self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
             self._n_people = len(people)
@@ -336,12 +336,10 @@ class WayFinder:
 
     def _make_map(self, points: Array, slack: float = 0.0) -> Map:
         """A new map that holds these `points`, with this `slack`."""
-        self._is_loose = slack > 0
         self._standing = None
         self._steps = 0
         clearance = self._s.r_robot + self._s.eps
-        self._map = Map(self._fixed, points, clearance, slack)
-        return self._map
+        return Map(self._fixed, points, clearance, slack)
 
     def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
         """Find the ways anew, and choose one."""
@@ -352,12 +350,15 @@ class WayFinder:
             or self._is_elsewhere(m, goal)
         ):
             (price,) = near.find_prices(near.stands, np.zeros(1), 0, m.shape)
-            m.measure(at, goal, self._s.v_max, price)
             self._standing = standing
             self._measured = goal
-            m.is_reached &= not self._is_loose or self._fits(
-                m.descend(near.start)[1:], m.cell
-            )
+            for _ in range(MOST_WAYS):
+                m.measure(at, goal, self._s.v_max, price)
+                tight = self._find_tight(m, m.descend(near.start)[1:])
+                if not len(tight):
+                    break
+                price[m.locate(tight)] = BODY_SECOND
+            m.is_reached &= not len(tight)
         if m.is_reached:
             m.end = np.array(goal)  # it may have moved a little
         before = np.array(inf)
@@ -376,14 +377,23 @@ class WayFinder:
         is_in_sight = m.is_reached and m.sees(m.end, np.array([goal]))[0]
         return goal != self._measured and not is_in_sight
 
-    def _fits(self, way: Array, cell: float) -> bool:
-        """True if h >= 0 somewhere in each `cell` of a `way`."""
-        h = self._fixed.h(*way.T)
-        near = self._fixed.select_near(h.min(axis=1, initial=inf) - cell)
-        tight = way[(h < 0).any(axis=0)]
-        x, y = cell * np.mgrid[-0.5:0.5:9j, -0.5:0.5:9j].reshape(2, -1, 1)
-        least = near.h(tight[:, 0] + x, tight[:, 1] + y).min(axis=0, initial=inf)
-        return bool((least.max(axis=0) >= 0).all())
+    def _find_tight(self, m: Map, way: Array) -> Array:
+        """Points of a `way` where h < 0 even beside it, on a loose map `m`, shape (n, 2) [m]."""
+        steps = np.diff(way, axis=0).repeat(8, axis=0)
+        points = way[:-1].repeat(8, axis=0)
+        points = (
+            points + np.tile(np.arange(8) / 8, len(way))[: len(steps), None] * steps
+        )
+        across = steps[:, ::-1] * (-1, 1) / np.hypot(*steps.T)[:, None]
+        found = [way[:0]]
+        # few obstacles are near so few points
+        for k in range(0, len(steps) if m is self._loose else 0, 64):
+            part = points[k : k + 64]
+            h = self._fixed.h(*part.T).min(axis=1, initial=inf)
+            x, y = np.moveaxis(part + m.cell * _ACROSS * across[k : k + 64], -1, 0)
+            least = self._fixed.select_near(h - m.cell).h(x, y).min(axis=0, initial=inf)
+            found.append(part[least.max(axis=0) < 0])
+        return np.concatenate(found)
 
     def _find_ways(
         self, m: Map, at: Point, near: Surroundings

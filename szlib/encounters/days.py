@@ -53,7 +53,7 @@ from .geometry import Area, AttentionalSpace
 from .settings import EncounterSettings
 
 # of the cached result of a day; a result of another version is computed again
-_VERSION = 11
+_VERSION = 12
 # purpose of an extraction's folder, as its marker states it
 PURPOSE = "encounters by day"
 # a row of the table of days, of an excluded one

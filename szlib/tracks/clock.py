@@ -140,7 +140,8 @@ def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
         max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
     require(max_gap > SHORTEST_GAP, "max_gap", max_gap, "longer than the clock's 0.1 s")
     within = same & (step <= max_gap + _ROUNDING)
-    seconds = float(step.sum(where=within))
+    steps = step[within]
+    seconds = float(steps.sum())
     ticks = seconds * TICKS_PER_SECOND
     require_memory(
         ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows"
@@ -159,9 +160,12 @@ def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
     rejected = {"in a gap-free piece that covers no tick": n_lost}
     stage = funnels.stage("clock: samples", len(t), n_covered, rejected)
-    n_steps = int(within.sum())
-    stage["interval"] = seconds / max(1, n_steps)
-    stage["positions"] = len(t) / max(1, len(t) - n_steps)
+    sizes = np.diff(np.flatnonzero(np.r_[True, ~within, True]))
+    stage["recorded"] = {
+        "squares": int(sizes @ sizes),
+        "seconds": seconds,
+        "cubes": float(steps @ steps**2),
+    }
     return funnels.attach(table, [*funnels.get(raw), stage])
 
 

@@ -39,7 +39,7 @@ _ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
 _EXCEL_1970 = 25_569  # number of the day 1970-01-01 in Excel
 _DROPPED_BITS = 11  # bits of a hash that are left out: a float holds the others exactly
 _LARGEST_EXACT = 2.0**53  # floats hold smaller whole numbers exactly
-_NO_IDS = "", "nan", "none", "null", "na"  # what programs write for nobody
+_NO_IDS = "", "nan", "none", "null"  # what programs write for nobody
 _FARTHEST_ORIGIN = 0.5  # from the middle of the positions [degrees]
 
 
@@ -133,7 +133,7 @@ def to_metres(table: pl.DataFrame, recipe: Recipe, path: Path) -> pl.DataFrame:
         u, v, w = (a * x + b * y + c for a, b, c in recipe.homography)
         return table.with_columns(x=u / w, y=v / w)
     if origin or recipe.unit == DEGREES:
-        middle = table.select(col("x", "y").median().fill_null(0.0).round(2)).row(0)
+        middle = table.select(col("x", "y").median().fill_null(np.nan).round(2)).row(0)
         if not origin or np.abs(np.subtract(origin, middle)).max() > _FARTHEST_ORIGIN:
             raise DataError(
                 f"{path}: positions are longitude and latitude; pass origin=, the longitude and latitude of "
@@ -147,11 +147,11 @@ def to_metres(table: pl.DataFrame, recipe: Recipe, path: Path) -> pl.DataFrame:
 def metres_in_degree(latitude: float) -> tuple[float, float]:
     """Metres in a degree of longitude, and of latitude, at a `latitude` on the ellipsoid of WGS 84."""
     phi = np.radians(latitude)
-    axis = 6_378_137.0
+    degree = np.radians(6_378_137.0)  # of the equator
     eccentricity = 6.694_379_990_14e-3
     root = np.sqrt(1 - eccentricity * np.sin(phi) ** 2)
-    north = axis * (1 - eccentricity) / root**3
-    return float(np.radians(axis * np.cos(phi) / root)), float(np.radians(north))
+    east = degree * np.cos(phi) / root
+    return float(east), float(degree * (1 - eccentricity) / root**3)
 
 
 # --- which column holds what --------------------------------------------------------------------------
@@ -179,8 +179,9 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
             unclear = (
                 f"{', '.join(same)} can all be {quantity}; {advise(columns=chosen)}"
             )
-            twice = f"names {same[0]} twice; rename one of them"
-            raise DataError(f"{where}: {unclear if len(same) > 1 else twice}")
+            if len(same) == 1:
+                unclear = f"names {same[0]} twice; rename one of them"
+            raise DataError(f"{where}: {unclear}")
     found = {**given, **{name: at[name][0] for name in needed if at[name]}}
     if missing := [name for name in needed if not at[name]]:
         known = [repr(name or k) for k, name in enumerate(names[:12])]

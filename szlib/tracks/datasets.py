@@ -128,8 +128,8 @@ def _expand(name: str | Path) -> list[Path]:
     shown = printable(name)
     expected = f"expected {_NAMED}, or a file, folder or glob of tracks"
     with explain_errors(f"{shown}: cannot be looked up", expected):
-        pattern = str(path.relative_to(path.anchor))
-        found = [path] if path.exists() else list(Path(path.anchor).glob(pattern))
+        root = Path(path.anchor)
+        found = [path] if path.exists() else [*root.glob(str(path.relative_to(root)))]
         if path.is_dir():
             found = [file for file in path.iterdir() if not file.name.startswith(".")]
     files = sorted(filter(Path.is_file, found))

@@ -150,12 +150,6 @@ def table(stages: Stages) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["stage", "what", "rows"])
 
 
-def text(stages: Stages) -> str:
-    """The table of `stages` as plain text in which each stage is named once."""
-    counts = table(stages).set_index(["stage", "what"])["rows"].map("{:,}".format)
-    return counts.to_string(header=False)
-
-
 def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
     """Add up several `funnels`, stage by stage of the same name, in the order of first occurrence.
 
@@ -168,11 +162,12 @@ def add(funnels: Iterable[Stages]) -> list[dict[str, Any]]:
     """
     added: dict[str, dict[str, Any]] = {}
     for each in chain.from_iterable(funnels):
-        name = each["stage"]
-        total = added.get(name, stage(name, 0, 0, {}))
-        counts = (Counter(total["rejected"]) + Counter(each["rejected"])).items()
-        entered, kept = (total[key] + each[key] for key in ("entered", "kept"))
-        added[name] = stage(name, entered, kept, dict(counts))
+        total = added.setdefault(each["stage"], {"stage": each["stage"]})
+        for key, value in each.items():
+            if isinstance(value, Mapping):
+                total[key] = dict(Counter(total.get(key, {})) + Counter(value))
+            elif key != "stage":
+                total[key] = total.get(key, 0) + value
     return list(added.values())
 
 
@@ -299,8 +294,8 @@ def find_implausible(rows: pl.DataFrame) -> list[str]:
     texts = [motion.fault] if motion and motion.fault else []
     person, step, x, y = (col(name).diff() for name in ("id", "t", "x", "y"))
     moved = (x**2 + y**2).sqrt()
-    is_jump = (person == 0) & (moved > _JUMP + _SPRINT * step)
-    speeds = rows.select((moved / step).filter(is_jump)).to_numpy()
+    is_far = moved > _JUMP + _SPRINT * step
+    speeds = rows.select((moved / step).filter(is_far, person == 0)).to_numpy()
     if len(speeds):
         texts.append(
             f"people jump {len(speeds):,} times, at up to {speeds.max():,.0f} m/s: positions or ids are wrong"

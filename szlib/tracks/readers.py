@@ -48,7 +48,7 @@ _HEAD = 1 << 16  # bytes of a text by which its day is found
 _FASTEST = 5.0
 _BLUR = 0.5
 _SOON = 5.0
-_MOST_SHARED = 0.02  # of all rows that may be in two recordings (assumed)
+_MOST_SHARED = 0.02  # of the rows of a recording that another one may hold (assumed)
 
 Select = Callable[[pl.DataFrame, str | None, float | None], pl.DataFrame]
 """A function of rows, their area and the longest gap within a track [s]: the rows needed, sorted."""
@@ -170,8 +170,8 @@ def merge_files(
     stages = [file.stage for file in files]
     for text in find_implausible(rows):
         warn(f"{names}: {text}")
-        name = f"{funnels.WARNING}{text}"
-        stages.append(funnels.stage(name, merged.height, merged.height, {}))
+        n = merged.height
+        stages.append(funnels.stage(f"{funnels.WARNING}{text}", n, n, {}))
     reasons = {
         "excluded day": merged.height - wanted.height,
         "never near the area": wanted.height - near.height,
@@ -345,6 +345,19 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     names = name_recordings([file.path for file in files])
     pairs = [*zip(files, names, strict=True)]
     check_names([name for file, name in pairs if file.is_named])
+    held = {
+        name: file.rows.select("id", col("t", "x", "y").round(2)).hash_rows().unique()
+        for file, name in pairs
+        if file.is_named
+    }
+    every = pl.concat([Series(dtype=pl.UInt64), *held.values()])
+    shared = every.filter(every.is_duplicated())
+    for name, own in held.items():
+        if len(shared) and own.is_in(shared.implode()).sum() > _MOST_SHARED * len(own):
+            raise DataError(
+                f"{name} and another recording hold the same rows; pass each recording once, and repeated "
+                "trials as one table with a column 'day'"
+            )
     named = [
         file._replace(rows=file.rows.with_columns(day=lit(name)))
         if file.is_named
@@ -355,13 +368,6 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
         f.rows.select(col.day.cast(String), "id", "t", "x", "y", file=k)
         for k, f in enumerate(named)
     )
-    if any(file.is_named for file in files):
-        places = rows.with_columns(col("t", "x", "y").round(2)).drop("file").unique()
-        again = places.filter(pl.struct(col("id", "t", "x", "y")).is_duplicated())
-        if again.height > _MOST_SHARED * places.height:
-            raise DataError(
-                f"{' and '.join(again['day'].unique().sort())} hold the same rows; pass each recording once"
-            )
     rows = rows.filter((col.file.min() != col.file.max()).over("day", "id"))
     rows = rows.sort("day", "id", "t")
     rows = rows.with_columns(col("t", "x", "y", "file").diff().over("day", "id"))

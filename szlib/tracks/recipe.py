@@ -178,7 +178,7 @@ class Recipe:
     def save(self, path: str | Path) -> Path:
         """Write the recipe to the file `path`, as JSON; returns its path."""
         content = json.dumps(self.as_json(), indent=1, ensure_ascii=False)
-        write_file(path, f"{content}\n")
+        write_file(path, content + "\n")
         return Path(path)
 
     @classmethod

@@ -59,14 +59,12 @@ def open_shape(shape: Shape, file: File) -> tuple[Source, Recipe]:
     n = shape.n_fields
     if not shape.parse:
         return open_text(file, False if n else shape.has_header, n), recipe
-    reader = "szlib"
     advice = "fetch it again"
     try:
         if shape.parse in PARSERS:
             table, stated = PARSERS[shape.parse](file)
             recipe = recipe.over(Recipe(**stated))
         else:
-            reader = "PedPy"
             advice = _PEDPY_ADVICE
             table, stated = _load_by_pedpy(shape.parse, file)
             recipe = Recipe(**stated).over(recipe)
@@ -77,7 +75,7 @@ def open_shape(shape: Shape, file: File) -> tuple[Source, Recipe]:
         fault = f"{type(error).__name__}: {error}"
         fault = " ".join(fault.replace(str(file.plain), file.path.name).split())
         raise DataError(
-            f"{file.path}: {reader} cannot read it as {shape.name} ({fault}); {advice}"
+            f"{file.path}: cannot be read as {shape.name} ({fault}); {advice}"
         ) from error
 
 
@@ -283,8 +281,8 @@ def _parse_level_x(file: File) -> ParsedFile:
     recording = file.path.with_name(f"{stem}_recordingMeta.{ending}")
     kinds = file.path.with_name(f"{stem}_tracksMeta.{ending}")
     if recording.is_file():
-        rates = pl.read_csv(recording, infer_schema=False)["frameRate"]
-        stated["frame_rate"] = float(rates[0])
+        rows = pl.read_csv(recording, infer_schema=False)
+        stated["frame_rate"] = float(rows["frameRate"][0])
     if kinds.is_file():
         people = pl.read_csv(kinds, infer_schema=False).select("trackId", "class")
         table = table.join(people, "trackId", "left", maintain_order="left")

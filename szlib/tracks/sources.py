@@ -189,10 +189,10 @@ def _open_packed(path: Path) -> Any:
     archive = zipfile.ZipFile(path)
     names = [name for name in archive.namelist() if not name.endswith("/")]
     if any(name.startswith("xl/") for name in names):
-        command = f"polars.read_excel({path.name!r}).write_csv({path.stem + '.csv'!r})"
         raise DataError(
             f"{path}, line 1: is a sheet of Excel; save the sheet as CSV in Excel, or by: "
-            f'pip install fastexcel; python -c "import polars; {command}"'
+            'pip install fastexcel; python -c "import polars; '
+            f'polars.read_excel({path.name!r}).write_csv({path.stem + ".csv"!r})"'
         )
     tracks = [name for name in names if not name.startswith("__MACOSX/")]
     if len(tracks) != 1:

@@ -196,9 +196,10 @@ def _run(options: argparse.Namespace) -> int:
     outcomes = summary["notebooks"].items()
     refused = {name: o["error"] for name, o in outcomes if o["status"] == "refused"}
     if refused:
-        names = ", ".join(refused)
         error = next(iter(refused.values()))
-        raise SzlibError(f"{names}: could not be run: {error}; finished results stay")
+        raise SzlibError(
+            f"{', '.join(refused)}: could not be run: {error}; finished results stay"
+        )
     return 0 if summary["passed"] else 1
 
 
@@ -220,11 +221,12 @@ def describe_pairs(tracks: pd.DataFrame, area: Area) -> str:
 
     crowd = Crowd.from_tracks(tracks, area)
     compared = name_kinds(crowd.meet(CLOSE).kind).isin(COMPARED)
-    resolved = crowd.sensor.resolved
-    loses = f"loses people who are nearer than {resolved:.1f} m to each other"
+    found = "resolves people at every distance"
+    if crowd.sensor.loses_people:
+        found = f"loses people who are nearer than {crowd.sensor.resolved:.1f} m to each other"
     return (
         f"pairs who come towards each other or cross, within {CLOSE:g} m: {compared.sum():,}\n"
-        f"sensor: it {loses if resolved else 'resolves people at every distance'}: {crowd.sensor}"
+        f"sensor: it {found}: {crowd.sensor}"
     )
 
 
@@ -256,7 +258,8 @@ def _inspect(options: argparse.Namespace) -> int:
     print(f"area {area}")
     if area.reason:
         print(f"area found: {area.reason}")
-    print(funnels.text(funnels.get(samples)))
+    counts = funnels.table(funnels.get(samples)).set_index(["stage", "what"])["rows"]
+    print(counts.map("{:,}".format).to_string(header=False))
     print(describe_pairs(tracks, area))
     command = f"{os.environ.get(COMMAND_VARIABLE, 'the same command')} --save"
     if options.save is not None:

@@ -145,14 +145,13 @@ def run_cells(
     notebook.metadata.pop("papermill")  # times and paths of this machine
     # The packages beside the notebooks come last: no file there replaces a library.
     place = script.parents[1] if script.parent.name == "deeper" else script.parent
-    add = f"import sys; sys.path.append({str(place)!r})"
     client = NotebookClient(
         notebook,
         kernel_manager_class=OwnKernelManager,
         resources={"metadata": {"path": str(script.parent)}},
         extra_arguments=[
             "--log-level=CRITICAL",
-            f"--InteractiveShellApp.exec_lines={add}",
+            f"--InteractiveShellApp.exec_lines=import sys; sys.path.append({str(place)!r})",
         ],
     )
     kernel = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1", **environment}

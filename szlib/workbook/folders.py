@@ -71,9 +71,9 @@ def find_notebooks(folder: str | Path | None = None) -> Path:
         places = [*places, BUNDLED] if NOTEBOOKS == BUNDLED else [NOTEBOOKS]
     found = next((place for place in places if list_notebooks(place)), None)
     if found is None:
-        name = printable(folder or NOTEBOOKS)
         raise DataError(
-            f"{name}: there are no notebooks; expected a folder that `szlib notebooks` wrote"
+            f"{printable(folder or NOTEBOOKS)}: there are no notebooks; expected a folder that "
+            "`szlib notebooks` wrote"
         )
     return found
 

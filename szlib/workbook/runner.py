@@ -180,8 +180,10 @@ def choose_notebooks(scripts: Sequence[Path], only: Iterable[str]) -> list[Path]
     found = {name: [s for s in scripts if folders.has_name(s, name)] for name in only}
     unknown = [name for name, each in found.items() if not each]
     if unknown:
-        known = ", ".join(script.stem for script in scripts)
-        raise DataError(f"no notebook {', '.join(unknown)}; there are {known}")
+        known = [script.stem for script in scripts]
+        raise DataError(
+            f"no notebook {', '.join(unknown)}; there are {', '.join(known)}"
+        )
     chosen = sum(found.values(), start=list[Path]())
     return [script for script in scripts if not found or script in chosen]
 

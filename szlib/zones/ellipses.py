@@ -188,8 +188,7 @@ def find_neighbours(speeds: Iterable[float], speed: float) -> list[float]:
     """The `speeds` next to a `speed`, below and above; one if it is among them, or outside of them."""
     known = sorted(speeds)
     below = [v for v in known if v <= speed]
-    above = [v for v in known if v >= speed]
-    return sorted({*below[-1:], *above[:1]})
+    return sorted({*below[-1:], *[v for v in known if v >= speed][:1]})
 
 
 def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:

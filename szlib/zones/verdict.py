@@ -36,13 +36,12 @@ BODY_CONTACT = 0.4
 FARTHEST_CENTER = 0.25
 # Widest interval of a semi-axis, as a share of it.
 WIDEST = 0.6
-# How much nearer than they are two people seem where positions are dt apart, divided by dt^2, in one pair of
-# 20 [m/s2] (measured on THOR-MAGNI, notebook 06: 3, 7 and 10 cm with 0.5, 0.8 and 1 s).
+# How much nearer two people seem where positions are dt apart, divided by dt^2, in one pair of 20 [m/s2]: at
+# least 3, 7 and 10 cm with 0.5, 0.8 and 1 s (measured on THOR-MAGNI, recorded every 0.4 s: notebook 06).
 HIDDEN = 0.1
 FEWEST_POSITIONS = (
     12  # of a track (measured: plazas of which one position every 0.3 s is left)
 )
-_OFTEN = {"interval": 0.0, "positions": FEWEST_POSITIONS}
 SIGNIFICANCE = 0.05
 # Encounters within r_max from which on the test finds a core of 0.8 m in more than 90 % of crowds.
 MIN_TESTED = 60
@@ -183,14 +182,16 @@ def _width(zone: FittedZone, speed: float) -> Iterator[str]:
     """What is wrong with the intervals: missing, of draws that disagree, or too wide."""
     if zone.uncertainty is not None and not zone.uncertainty.has_converged:
         yield f"the draws of the posterior do not agree ({zone.uncertainty.description})"
-    stages = zone.provenance.get("funnel", [])
-    clock = next((each for each in stages if "interval" in each), _OFTEN)
-    hidden = HIDDEN * clock["interval"] ** 2
-    if clock["positions"] < FEWEST_POSITIONS:
-        yield (
-            f"a track has {clock['positions']:.0f} positions (mean), too few to tell how near people came: "
-            "record people for longer, or more often"
-        )
+    hidden = 0.0
+    for stage in zone.provenance.get("funnel", []):
+        if sums := stage.get("recorded"):
+            hidden = HIDDEN * sums["cubes"] / sums["seconds"]
+            positions = sums["squares"] / stage["entered"]
+            if positions < FEWEST_POSITIONS:
+                yield (
+                    f"a track has {positions:.0f} positions (mean, by position), too few to tell how near "
+                    "people came: record people for longer, or more often"
+                )
     for fitted in find_neighbours(zone.ellipses, speed):
         for name, value in zip("ab", zone.ellipses[fitted].semi_axes, strict=True):
             low, high = _interval(zone, fitted, name)
@@ -207,11 +208,12 @@ def _width(zone: FittedZone, speed: float) -> Iterator[str]:
                     f"at {fitted:g} m/s the semi-axis {name} is {low:.2f} to {high:.2f} m, wider than "
                     f"{WIDEST:.0%} of it: {lacking} would do"
                 )
-            elif high - low < 2 * hidden:
+            elif (half := (high - low) / 2) < hidden:
                 yield (
-                    f"at {fitted:g} m/s the semi-axis {name} is {low:.2f} to {high:.2f} m, but positions are "
-                    f"{clock['interval']:.1f} s apart: who steps aside between two of them seems up to "
-                    f"{100 * hidden:.0f} cm nearer; record one every 0.5 s or more often"
+                    f"at {fitted:g} m/s the semi-axis {name} is known to {100 * half:.0f} cm, but positions "
+                    f"are {np.sqrt(hidden / HIDDEN):.1f} s apart: a person who steps aside between two of "
+                    f"them seems up to {100 * hidden:.0f} cm nearer; record one every "
+                    f"{np.sqrt(half / HIDDEN):.1f} s"
                 )
 
 

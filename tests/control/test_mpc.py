@@ -619,7 +619,8 @@ def test_settings_and_walls_cannot_be_changed_in_silence():
     controller = szlib.MPCCBF(ZONE, walls=[[(0, 3), (5, 3)]])
     with pytest.raises(AttributeError):
         controller.settings = szlib.MPCSettings(v_max=0.3)
-    with pytest.raises(ValueError, match="read-only"):
-        controller.walls[0, 0] = 1.0
+    for each in (controller, copy.deepcopy(controller)):
+        with pytest.raises(ValueError, match="read-only"):
+            each.walls[0, 0] = 1.0
     with pytest.raises(szlib.SolverError, match="settings must be MPCSettings"):
         szlib.MPCCBF(ZONE, settings={})

@@ -551,6 +551,7 @@ def test_something_that_is_no_obstacle_is_refused():
         lambda x, y, t, px: hypot(x - px, y),
         lambda x, y, t, px: max(x - px, y),
         lambda x, y, px: x - px,
+        lambda x, y, t, px: np.linalg.norm([x - px, y]),
     ],
 )
 def test_a_distance_that_is_no_formula_is_refused_with_advice(distance):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import tracemalloc
+from itertools import pairwise
 from math import asin, atan2, cos, hypot, pi, sin
 from typing import Any
 
@@ -373,6 +375,11 @@ def make_slit(width: float, door: bool) -> list[Any]:
     return [[(-3, -6), (9, -6), (9, 6), (-3, 6), (-3, -6)], *middle]
 
 
+def cut_wall(around: list[Any], *others: Any) -> list[Any]:
+    """The segments of a polygonal chain, and the `others`."""
+    return [*map(list, pairwise(around)), *others]
+
+
 def test_an_earlier_goal_in_a_wall_does_not_close_a_door() -> None:
     controller = szlib.MPCCBF(ZONE, walls=make_slit(0.66, door=True), settings=AMONG)
     *_, last = drive(controller, (3.0, 3.0), 60, start=(0.0, 0.0, 0.0, 0.0))
@@ -380,14 +387,35 @@ def test_an_earlier_goal_in_a_wall_does_not_close_a_door() -> None:
     assert np.hypot(*(last.predicted[0, :2] - (6.0, 0.0))) < 0.05
 
 
-@pytest.mark.parametrize("width", [0.62, 0.66, 0.72, 0.76])
-@pytest.mark.parametrize("y", [0.0, 0.13, 0.3, 0.5])
-def test_a_door_is_a_way_if_the_robot_fits(width: float, y: float) -> None:
-    """It needs 0.7 m, wherever the cells of the map lie."""
-    walls = make_slit(width, door=False)
+@pytest.mark.parametrize("width", [0.62, 0.66, 0.69, 0.71, 0.76])
+def test_a_door_is_a_way_if_the_robot_fits(width: float) -> None:
+    """It needs 0.7 m, wherever the cells of the map lie; to 1 cm."""
+    for shift in np.random.default_rng(0).uniform(-0.5, 0.5, (10, 2)):
+        walls = np.array(cut_wall(*make_slit(width, door=False))) + shift
+        controller = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG)
+        step = controller.step((0.0, 0.1, 0.0, 0.0), (6.0, -0.2))
+        assert step.goal_blocked == (width < 0.7), shift
+
+
+def test_a_narrow_door_is_taken_beside_a_slit_that_is_too_narrow() -> None:
+    """No cell's centre is free in either; the slit is on the shorter way."""
+    walls = [[(3, -6), (3, -3.4)], [(3, -2.6), (3, -0.33)], [(3, 0.33), (3, 6)]]
+    walls += [[(-3, y), (9, y)] for y in (-6, 6)] + [[(x, -6), (x, 6)] for x in (-3, 9)]
     controller = szlib.MPCCBF(ZONE, walls=walls, settings=AMONG)
-    step = controller.step((0.0, y, 0.0, 0.0), (6.0, y))
-    assert step.goal_blocked == (width < 0.7)
+    *_, last = drive(controller, (6.0, 0.07), 200, start=(0.0, 0.07, 0.0, 0.0))
+    assert np.hypot(*(last.predicted[0, :2] - (6.0, 0.07))) < 0.05
+
+
+def test_a_long_narrow_corridor_of_many_walls_takes_little_memory() -> None:
+    ends = np.linspace(0, 50, 2501)
+    pieces = np.stack([ends[:-1], ends[1:]], axis=1)
+    walls = [np.dstack([pieces, np.full_like(pieces, y)]) for y in (-0.355, 0.355)]
+    controller = szlib.MPCCBF(ZONE, walls=np.concatenate(walls), settings=AMONG)
+    tracemalloc.start()
+    step = controller.step((-2.0, 0.0, 0.0, 0.0), (52.0, 0.0))
+    assert not step.goal_blocked
+    assert tracemalloc.get_traced_memory()[1] < 5e8
+    tracemalloc.stop()
 
 
 def test_the_free_end_of_a_wall_is_no_door() -> None:

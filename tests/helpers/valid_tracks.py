@@ -31,4 +31,4 @@ def check_tracks(tracks: pd.DataFrame) -> None:
             'the table has no funnel; expected its stages in .attrs["funnel"]'
         )
     for stage in stages:
-        funnels.stage(*list(stage.values())[:4])
+        funnels.stage(*(stage[key] for key in ("stage", "entered", "kept", "rejected")))

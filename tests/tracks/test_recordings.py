@@ -105,7 +105,9 @@ def test_copies_of_a_recording_are_refused_whatever_their_names(tmp_path: Path) 
     single = tmp_path / "single.parquet"
     rows.astype({"t": "float32", "x": "float32"}).to_parquet(single)
     for copy in (shuffled, packed, rounded, single):
-        with pytest.raises(szlib.DataError, match=r"and .* hold the same rows"):
+        with pytest.raises(
+            szlib.DataError, match="monday and another recording hold the same"
+        ):
             szlib.read_tracks([first, copy])
     with pytest.raises(szlib.DataError, match="hold the same rows"):
         szlib.read_tracks([rows, rows])
@@ -120,7 +122,9 @@ def test_a_part_of_another_recording_is_refused(tmp_path: Path) -> None:
     part = write(tmp_path / "part.csv", rows.iloc[len(rows) // 2 :])
     holes = write(tmp_path / "holes.csv", rows[rows.index % 50 > 0])
     for other in (part, holes):
-        with pytest.raises(szlib.DataError, match="whole hold the same rows"):
+        with pytest.raises(
+            szlib.DataError, match="and another recording hold the same rows"
+        ):
             szlib.read_tracks([whole, other])
 
 

@@ -202,14 +202,17 @@ def test_intervals_finer_than_positions_far_apart_can_tell_are_undecided(careful
     """People who step aside between two positions seem nearer than they were."""
     stage = {"stage": "clock: samples", "entered": 1, "kept": 1, "rejected": {}}
     for interval, expected in ((0.1, "usable"), (0.5, "usable"), (1.5, "undecided")):
-        funnel = [stage | {"interval": interval, "positions": 30.0}]
+        sums = {"squares": 30, "seconds": interval, "cubes": interval**3}
+        funnel = [stage | {"recorded": sums}]
         zone = replace(careful, provenance=careful.provenance | {"funnel": funnel})
         assert zone.verdict(SPEED) == expected
     assert "positions are 1.5 s apart" in zone.verdict(SPEED).sentence
+    assert "record one every 0.7 s" in zone.verdict(SPEED).sentence
 
 
 def test_tracks_of_few_positions_are_undecided(careful):
-    stage = {"stage": "clock: samples", "interval": 0.3, "positions": 7.0}
+    sums = {"squares": 70, "seconds": 1.0, "cubes": 0.09}
+    stage = {"stage": "clock: samples", "entered": 10, "recorded": sums}
     zone = replace(careful, provenance=careful.provenance | {"funnel": [stage]})
     assert zone.verdict(SPEED).reasons[0].startswith("a track has 7 positions")
 
