@@ -220,8 +220,8 @@ from scipy.stats import binomtest
 nobody = record.committed_table("06_nobody", respect.recompute_nobody, where="radius > 0")
 nobody["alarm"] = nobody["p_value"] <= 0.05
 alarms = nobody.groupby(["kinds", "bunch"])["alarm"].agg(["sum", "size"])
-counts = [*alarms.itertuples(index=False), alarms.sum()]
-intervals = [binomtest(*row).proportion_ci() for row in counts]
+trials = [*alarms.itertuples(index=False), alarms.sum()]
+intervals = [binomtest(*row).proportion_ci() for row in trials]
 record.check(
     "where people ignore each other, no more than 5 % of crowds are false alarms, by the 95 % interval of each kind and of all",
     all(low <= 0.05 for low, _ in intervals),
