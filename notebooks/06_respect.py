@@ -555,16 +555,16 @@ halves = record.committed_table("06_collision", collision.recompute, where="site
 halves["speed"] = halves[["slowest", "fastest"]].mean(axis=1)
 errors = halves[["half_low", "half_high"]].sub(halves["half"], axis=0).abs().T.to_numpy()
 fig, panels = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
-circle = f"by chance, without pairs within {collision.CIRCLE} m"
 looks = {
     "grand-central": ("Grand Central", figures.BLUE, "o-"),
-    "circle": (circle, figures.BLACK, "x--"),
+    "circle": (f"by chance, without pairs within {collision.CIRCLE} m", figures.BLACK, "x--"),
     "atc-1hz": ("ATC day", figures.ORANGE, "s-"),
     "crowd": ("people who ignore each other", figures.GREY, "^:"),
 }
+turns = halves.query("site == 'grand-central' and variable == 'time to collision'")["half"].mean()
 titles = (
     "The distance on the way grows",
-    "They turn about 1 s before",
+    f"At Grand Central they turn about {turns:.1f} s before",
     "The nearest approach grows far less",
 )
 for ax, title, variable in zip(panels, titles, collision.BINS, strict=True):
