@@ -53,8 +53,8 @@
 # %% [markdown]
 # ## Three routes
 #
-# - **The idea.** [06](06_respect.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 05 min to read.
-# - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 6 h 30 min to read.
+# - **The idea.** [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 3 h 00 min to read.
+# - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 6 h 35 min to read.
 # - **The course, in six weeks.** Reading and exercises; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | exercises | to do |
@@ -64,7 +64,7 @@
 # | 3 | A zone of your own, and a barrier around it | [07](07_barriers.ipynb) | 50 min | [4.1-4.3](exercises/sheet4_own_zone.ipynb#4.1-A-zone-of-your-own-(an-evening,-150-min)) | 2 h 45 min |
 # | 4 | A controller of your own | [08](08_build_a_controller.ipynb) | 45 min | [5.1-5.8](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)) | 2 h 15 min |
 # | 5 | MPC with barriers, and the first meetings | [09](09_passing.ipynb), [10](10_corridor.ipynb) | 55 min | [6.1-6.5](exercises/sheet6_controller.ipynb#6.1-MPC-on-a-road-(25-min)) | 2 h 15 min |
-# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 1 h 30 min | [7.1-7.5](exercises/sheet7_robot.ipynb#7.1-gamma-by-experiment-(40-min)) | 1 h 45 min |
+# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 1 h 35 min | [7.1-7.5](exercises/sheet7_robot.ipynb#7.1-gamma-by-experiment-(40-min)) | 1 h 45 min |
 
 # %% [markdown]
 # ## The first step

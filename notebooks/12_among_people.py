@@ -31,7 +31,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [11](11_waiting.ipynb) · next: [13 - The
-# laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 50 min · needs
+# laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 55 min · needs
 # [09](09_passing.ipynb) · exercises: [7.4](exercises/sheet7_robot.ipynb#7.4-Count-the-ways-(20-min)) ·
 # laboratory: [13](13_laboratory.ipynb)
 #

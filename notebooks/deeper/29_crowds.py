@@ -29,7 +29,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [28](28_sentences.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 30 min · needs [12](../12_among_people.ipynb)
+# [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 35 min · needs [12](../12_among_people.ipynb)
 #
 # **Afterwards you can** say which safety claims of the controller hold among people who react.
 

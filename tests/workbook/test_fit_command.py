@@ -40,7 +40,7 @@ def test_zone_from_tracks_is_that_of_the_library(recording, expected, tmp_path, 
     out = tmp_path / "zone.json"
     assert fit(recording, "--out", out) == 0
     printed, zone = capsys.readouterr().out, szlib.SocialZone.load(out)
-    assert printed.startswith("method respect: the zone that people keep; it lies in")
+    assert printed.startswith("method respect: the zone that people keep, with 95 %")
     assert zone.ellipses == expected.ellipses
     assert zone.null_test == expected.null_test and zone.null_test is not None
     assert printed.splitlines()[-1] == f"zone at 1.1 m/s: {zone.verdict(1.1).sentence}"
