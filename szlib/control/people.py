@@ -400,7 +400,8 @@ class Tracker:
         for name, (person, time) in self._last_seen.items():
             if name not in given:
                 present.append(person.after(now - time))
-        late = float(np.nanmax([abs(now - time) for *_, time in measured] + [0.0]))
+        ages = [abs(now - time) for *_, time in measured if time == time]  # no NaN
+        late = max(ages, default=0.0)
         fault = ""
         if late > self.memory:
             fault = (
