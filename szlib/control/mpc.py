@@ -393,14 +393,14 @@ class MPCCBF(Controller):
         stop = max(map(abs, after)) / s.a_max
         time = stop + 2 * s.dt
         reach = hypot(vx, vy) * s.dt + hypot(*after) * (s.dt + stop) / 2
-        reach += s.a_max * s.dt**2 + s.r_robot - self.settings.r_robot
-        walls = bodies = Obstacles((), self.settings.r_robot)
+        reach += s.a_max * s.dt**2 + s.r_robot - self._settings.r_robot
+        walls = bodies = Obstacles((), self._settings.r_robot)
         place, room = self._room
         if room - dist(place, at) < reach:
             gaps = self._walls.gaps(*at)
             walls = self._walls.select_near(gaps - reach)
             self._room = at, float(gaps.min(initial=inf))
-        contact = BODY_RADIUS + self.settings.r_robot + reach
+        contact = BODY_RADIUS + self._settings.r_robot + reach
         for person in scene.people:
             if dist(person.position, at) - contact < time * hypot(*person.velocity):
                 return walls, find_bodies(scene.zones, self.settings)
@@ -433,7 +433,7 @@ class MPCCBF(Controller):
         is_point: bool = False,
     ) -> Scene:
         """What the step is asked, with the zone of every person; for the disc, or for the planned point."""
-        s = self._s if is_point else self.settings
+        s = self._s if is_point else self._settings
         fixed = self._fixed if is_point else self._fixed_of_disc
         people = tracked.people
         zones = Obstacles((), s.r_robot)

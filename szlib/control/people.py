@@ -400,13 +400,12 @@ class Tracker:
         for name, (person, time) in self._last_seen.items():
             if name not in given:
                 present.append(person.after(now - time))
-        ages = [abs(now - time) for *_, time in measured if time == time]  # no NaN
-        late = max(ages, default=0.0)
+        late = [time for *_, time in measured if abs(now - time) > self.memory]
         fault = ""
-        if late > self.memory:
+        if late:
             fault = (
-                f"people were measured {late:.3g} s from now, and are remembered for "
-                f"{self.memory:g} s only"
+                f"people were measured {max(abs(now - time) for time in late):.3g} s from now, and are "
+                f"remembered for {self.memory:g} s only"
             )
         return TrackedPeople(tuple(present), rejected, unknown, fault)
 

@@ -192,7 +192,7 @@ class Program:
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
         self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
         self._is_hard = s.decay_price >= HARD_PRICE
-        self._sense = np.full(size, _HARD, np.intc)
+        self._sense = np.where(self.prices > 0, _SOFT, np.intc(_HARD))
         self._sense[3 * s.N : self.first] = _EQUAL
         self._models = dict[Any, Any]()
 
@@ -239,7 +239,9 @@ class Program:
         weights = prices[rows]
         slopes = self.slopes[rows][len(self.gradient) :]
         given = self.hessian, self.gradient, slopes, self.upper[rows], lower[rows]
-        sense = np.where(weights > 0, _SOFT, self._sense[rows])
+        sense = self._sense[rows]
+        if prices is not self.prices:  # level by level
+            sense = np.where(weights > 0, _SOFT, np.where(sense == _SOFT, _HARD, sense))
         size = None if rows is _EVERY else (len(weights), np.count_nonzero(weights))
         model = self._models.pop(size, None)
         if model is None:
@@ -443,5 +445,7 @@ class Planner:
             program.evaluate()
             is_relaxed = is_relaxed or program.is_violated()
         violations = program.sum_violations() if is_relaxed else ()
-        cost = float(program.cost[0] + program.lower.clip(0.0) @ program.prices)
+        cost = 0.0
+        if is_relaxed or s.lookahead < inf:  # it may be compared
+            cost = float(program.cost[0] + program.lower.clip(0.0) @ program.prices)
         return Plan(inputs, cost, violations, is_relaxed, timed_out)

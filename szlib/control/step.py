@@ -386,12 +386,12 @@ class Step:
     def _explain_stuck(self) -> str:
         """How far the goal is, and what holds the robot: the barriers that are at their limit."""
         holding = np.flatnonzero(self.residual.min(axis=1, initial=inf) <= HOLDS)
-        names = " and ".join(self.scene.name(i) for i in holding.tolist())
+        names = [self.scene.name(i) for i in holding.tolist()]
         s = self.scene.settings
-        helps = "another goal" if s.decay_price < inf else "among_people()"
         return (
             f"{dist(self.scene.state[:2], self.scene.goal):.1f} m from the goal; held by "
-            f"{names or 'nothing'}; what helps: {helps}"
+            f"{' and '.join(names) or 'nothing'}; what helps: "
+            f"{'another goal' if s.decay_price < inf else 'among_people()'}"
         )
 
     def _advise(self, row: Row) -> str:

@@ -250,8 +250,7 @@ def _find_worst(scene: Any, rows: Iterable[Rows]) -> Row:
     i, k = np.unravel_index(values.argmin(), values.shape)
     name = {"speed": "the speed limit", "end": "rest"}.get(kind, "")
     if level is not None:
-        of = "the body of " if kind == "body" else ""
-        name = f"the condition of {of}{scene.name(first + int(i))}"
+        name = f"the condition of {'the body of ' * (kind == 'body')}{scene.name(first + int(i))}"
     return Row(kind, f"{name} at k = {k + 1}", float(values[i, k]))
 
 

@@ -180,9 +180,9 @@ def walls_from_map(
         return walls_from_grid(is_solid[::-1], side, origin, simplify=within)
     # whatever YAML, Pillow and NumPy say of a bad file
     except Exception as fault:
-        expected = "a YAML file of map_server, whole, with an opaque PGM or PNG picture"
         raise DataError(
-            f"{printable(path)}: {what} cannot be read: {fault}; expected {expected}"
+            f"{printable(path)}: {what} cannot be read: {fault}; expected a YAML file of map_server, whole, "
+            "with an opaque PGM or PNG picture"
         ) from fault
 
 
