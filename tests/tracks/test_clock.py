@@ -232,6 +232,15 @@ def test_samples_without_a_tick_are_counted() -> None:
     }
 
 
+def test_sums_of_several_days_add_up() -> None:
+    """By them a verdict knows how often positions were recorded, of extracted days as well."""
+    days = [funnels.get(to_clock(make_raw(np.arange(n) / 10))) for n in (10, 30)]
+    (stage,) = funnels.add(days)
+    assert stage["entered"] == stage["kept"] == 40
+    expected = {"squares": 1000, "seconds": 3.8, "cubes": 0.038}
+    assert stage["recorded"] == pytest.approx(expected)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_row_order_and_ids_do_not_matter(seed: int) -> None:
     raw = walkers(seed)
