@@ -90,8 +90,10 @@ _WAITING = 0.8  # rest that is called waiting [s]
 _TIMES = np.linspace(0.0, 2 * SEARCH_TIME, 121)
 _TICK = float(_TIMES[1])
 
-# where free space is looked for: from a zone's centre to where the robot passes; and across a way, in cells
+# where free space is looked for: from a zone's centre to where the robot passes; along each step of a way, as
+# shares of it; and across the way, in cells
 _BESIDE = np.linspace(0, 1, 20)
+_SHARES = np.arange(8)[:, None] / 8
 _ACROSS = np.linspace(-1, 1, 33)[:, None, None]
 
 
@@ -379,15 +381,13 @@ class WayFinder:
 
     def _find_tight(self, m: Map, way: Array) -> Array:
         """Points of a `way` where h < 0 even beside it, on a loose map `m`, shape (n, 2) [m]."""
-        steps = np.diff(way, axis=0).repeat(8, axis=0)
-        points = way[:-1].repeat(8, axis=0)
-        points = (
-            points + np.tile(np.arange(8) / 8, len(way))[: len(steps), None] * steps
-        )
+        steps = np.diff(way, axis=0)
+        points = (way[:-1, None] + steps[:, None] * _SHARES).reshape(-1, 2)
         across = steps[:, ::-1] * (-1, 1) / np.hypot(*steps.T)[:, None]
+        across = across.repeat(len(_SHARES), axis=0)
         found = [way[:0]]
         # few obstacles are near so few points
-        for k in range(0, len(steps) if m is self._loose else 0, 64):
+        for k in range(0, len(points) if m is self._loose else 0, 64):
             part = points[k : k + 64]
             h = self._fixed.h(*part.T).min(axis=1, initial=inf)
             x, y = np.moveaxis(part + m.cell * _ACROSS * across[k : k + 64], -1, 0)

@@ -39,9 +39,8 @@ WIDEST = 0.6
 # How much nearer two people seem where positions are dt apart, divided by dt^2, in one pair of 20 [m/s2]: at
 # least 3, 7 and 10 cm with 0.5, 0.8 and 1 s (measured on THOR-MAGNI, recorded every 0.4 s: notebook 06).
 HIDDEN = 0.1
-FEWEST_POSITIONS = (
-    12  # of a track (measured: plazas of which one position every 0.3 s is left)
-)
+# Fewest positions of a track (measured: plazas of which one position every 0.3 s is kept).
+FEWEST_POSITIONS = 12
 SIGNIFICANCE = 0.05
 # Encounters within r_max from which on the test finds a core of 0.8 m in more than 90 % of crowds.
 MIN_TESTED = 60
