@@ -69,8 +69,7 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     with suppress(ValueError):
         array = np.asarray(value)
     of = f"shape {shape}".replace("Ellipsis", "...")
-    expected = f"numbers of {of}"
-    require(array.dtype.kind in "iuf", name, value, expected, SolverError)
+    require(array.dtype.kind in "iuf", name, value, f"numbers of {of}", SolverError)
     sizes = shape[1:] if ... in shape else shape
     n_free = array.ndim - len(sizes)
     if array.shape[n_free:] != sizes or (n_free and sizes == shape):

@@ -2,7 +2,7 @@
 
 Every file is written here: completely, or not at all. A folder of results holds a marker file, `.szlib`. Its
 first line says what the folder is for. A folder that holds other files and no marker is never written into.
-Neither is a folder that holds the input data.
+Neither is a folder that holds the input data. What a killed process left unfinished is removed after an hour.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import time
 import uuid
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +20,8 @@ from .errors import StorageError
 from .input_files import explain_errors, open_regular, read_small
 
 MARKER = ".szlib"  # name of the file that marks a folder as szlib's
+_PART = f"{MARKER}-part-"  # how names of unfinished files begin
+_ABANDONED = 3600  # age of an unfinished file that no process writes any more [s]
 
 
 def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) -> None:
@@ -29,9 +32,13 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    unfinished = path.with_name(f"{MARKER}-part-{uuid.uuid4().hex}")
-    advice = "make room, or choose a folder that is writable; files that were finished before are intact"
-    with explain_errors(f"{path}: cannot be written", advice, StorageError, OSError):
+    unfinished = path.with_name(f"{_PART}{uuid.uuid4().hex}")
+    with explain_errors(
+        f"{path}: cannot be written",
+        "make room, or choose a folder that is writable; files that were finished before are intact",
+        StorageError,
+        OSError,
+    ):
         try:
             _fill(unfinished, data, durable)
             unfinished.replace(path)
@@ -85,15 +92,22 @@ def claim_folder(folder: str | Path, purpose: str) -> Path:
     StorageError : the folder is refused, or cannot be made or read.
     """
     folder = Path(folder)
-    failed = f"{folder}: cannot be made or read"
-    advice = "choose another folder"
-    with explain_errors(failed, advice, StorageError, OSError):
+    with explain_errors(
+        f"{folder}: cannot be made or read",
+        "choose another folder",
+        StorageError,
+        OSError,
+    ):
         folder.mkdir(parents=True, exist_ok=True)
         foreign = sorted(
             entry.name
             for entry in folder.iterdir()
             if not (entry.name.startswith(MARKER) or (entry / MARKER).is_file())
         )
+    for part in folder.glob(f"{_PART}*"):
+        with suppress(OSError):
+            if part.stat().st_mtime < time.time() - _ABANDONED:
+                part.unlink()
     owner = folder_purpose(folder)
     if owner is None and foreign:
         raise StorageError(
@@ -101,8 +115,10 @@ def claim_folder(folder: str | Path, purpose: str) -> Path:
             "empty folder (or remove the results of an older szlib)"
         )
     if owner is None:
-        text = f"{purpose}\nWritten by szlib, which may replace every file here.\n"
-        write_file(folder / MARKER, text)
+        write_file(
+            folder / MARKER,
+            f"{purpose}\nWritten by szlib, which may replace every file here.\n",
+        )
     elif owner != purpose:
         raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
     return folder

@@ -21,8 +21,6 @@ import psutil
 
 from .errors import DataError, MemoryLimitError, SzlibError
 
-# Zero-width letters of Persian, Hindi and emoji, which Python calls not printable.
-_JOINERS = "\u200c\u200d"
 # what differs after a file has changed
 _STATE = attrgetter("st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
 
@@ -87,8 +85,9 @@ def reading(
     expected : what the file should be.
     error : class of the error.
     """
-    shown = f"{printable(path)}: cannot be read {what}"
-    return explain_errors(shown, f"expected {expected}", error)
+    return explain_errors(
+        f"{printable(path)}: cannot be read {what}", f"expected {expected}", error
+    )
 
 
 def open_regular(path: Path) -> BinaryIO:
@@ -127,8 +126,11 @@ def file_state(path: Path) -> Any:
 
 def opening(path: Path) -> AbstractContextManager[None]:
     """Raise DataError if the block cannot open the file `path`."""
-    shown = f"{printable(path)}: cannot be opened"
-    return explain_errors(shown, "expected a file that may be read", faults=OSError)
+    return explain_errors(
+        f"{printable(path)}: cannot be opened",
+        "expected a file that may be read",
+        faults=OSError,
+    )
 
 
 def file_content(file: Path) -> tuple[int, str]:
@@ -140,8 +142,10 @@ def file_content(file: Path) -> tuple[int, str]:
 
 def printable(name: object) -> str:
     """The file name `name` as text for any file and any terminal: bytes that are not UTF-8 are escaped."""
+    # Python calls the zero-width letters of Persian, Hindi and emoji not printable.
     return "".join(
-        c if c.isprintable() or c in _JOINERS else ascii(c)[1:-1] for c in str(name)
+        c if c.isprintable() or c in "\u200c\u200d" else ascii(c)[1:-1]
+        for c in str(name)
     )
 
 
@@ -150,8 +154,9 @@ def printable(name: object) -> str:
 
 def parse_size(text: str) -> int:
     """Bytes of `text`, such as "4GB", "512 MB" or "2g"; raises MemoryLimitError for other text."""
-    pattern = r"([1-9]\d{0,14}\.?\d{0,9}) ?([KMGT]?)B?"
-    found = re.fullmatch(pattern, text.strip().upper(), re.ASCII)
+    found = re.fullmatch(
+        r"([1-9]\d{0,14}\.?\d{0,9}) ?([KMGT]?)B?", text.strip().upper(), re.ASCII
+    )
     if found is None:
         raise MemoryLimitError(
             f"memory {text!r}: expected an amount such as 4GB or 512MB"
@@ -160,9 +165,17 @@ def parse_size(text: str) -> int:
 
 
 def memory_limit() -> int:
-    """Bytes that this process may use in total."""
-    text = os.environ.get(MEMORY_VARIABLE)
-    return parse_size(text) if text else _available_memory()
+    """Bytes that this process may use in total.
+
+    Without a limit it is four fifths of the bytes that are free without swapping, or of those that a Linux
+    container has (cgroup 2).
+    """
+    if text := os.environ.get(MEMORY_VARIABLE):
+        return parse_size(text)
+    available = psutil.virtual_memory().available
+    with suppress(OSError, ValueError):  # "max": no limit
+        available = min(available, int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return int(_SHARE * available)
 
 
 @contextmanager
@@ -186,11 +199,3 @@ def require_memory(size: float, what: str) -> None:
             f"{what} takes about {size / 1e9:.3g} GB of memory, and the limit is {allowed / 1e9:.3g} GB; "
             f"split the data by time, or raise the limit (--memory, ${MEMORY_VARIABLE})"
         )
-
-
-def _available_memory() -> int:
-    """Four fifths of the bytes free without swapping, or of those that a Linux container has (cgroup 2)."""
-    available = psutil.virtual_memory().available
-    with suppress(OSError, ValueError):  # "max": no limit
-        available = min(available, int(Path("/sys/fs/cgroup/memory.max").read_text()))
-    return int(_SHARE * available)

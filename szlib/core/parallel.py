@@ -56,9 +56,12 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
         initializer=_begin_process,
         initargs=(os.getpid(), share),
     )
-    killed = "a worker process was killed, perhaps for lack of memory"
-    advice = "finished tasks are kept: run again with fewer processes"
-    with explain_errors(killed, advice, SzlibError, TerminatedWorkerError):
+    with explain_errors(
+        "a worker process was killed, perhaps for lack of memory",
+        "finished tasks are kept: run again with fewer processes",
+        SzlibError,
+        TerminatedWorkerError,
+    ):
         with safe_path():
             results = workers(tasks)
         yield from results
@@ -97,12 +100,12 @@ def cluster(address: str | None, *, wait: float = 10.0) -> Iterator[Any]:
     if address is None:
         yield
         return
-    failed = f"no Dask scheduler with a worker answers at {address!r} within {wait:g} s"
-    advice = (
+    with explain_errors(
+        f"no Dask scheduler with a worker answers at {address!r} within {wait:g} s",
         f"start `dask scheduler`, and `dask worker {address}`, or wait longer, such as --wait 600; "
-        "Dask is installed by: pip install 'szlib[cluster]'"
-    )
-    with explain_errors(failed, advice, SzlibError):
+        "Dask is installed by: pip install 'szlib[cluster]'",
+        SzlibError,
+    ):
         from distributed import Client
 
         client = Client(address, timeout=wait)

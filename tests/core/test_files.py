@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import errno
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -94,6 +95,20 @@ def test_a_folder_with_foreign_files_or_other_results_is_refused(
         files.claim_folder(tmp_path / "all", "results"),
         "claimed folders in it are not foreign",
     )
+
+
+def test_unfinished_files_of_killed_processes_are_removed_after_an_hour(
+    tmp_path: Path,
+) -> None:
+    folder = files.claim_folder(tmp_path, "days")
+    ages = {"old": 3700, "new": 3500}
+    for name, age in ages.items():
+        part = folder / f".szlib-part-{name}"
+        part.write_text("half")
+        os.utime(part, (0, time.time() - age))
+    files.claim_folder(tmp_path, "days")
+    left = sorted(path.name for path in folder.iterdir())
+    assert left == [".szlib", ".szlib-part-new"]
 
 
 def test_a_cached_file_is_known_by_its_content_and_what_it_was_made_of(
