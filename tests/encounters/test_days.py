@@ -15,6 +15,7 @@ from pathlib import Path
 
 import joblib
 import pandas as pd
+import psutil
 import pytest
 from helpers.faulty_disk import FaultyDisk
 
@@ -328,8 +329,10 @@ def kill_and_resume(days, out, reference, kills, seed):
             run.wait(timeout=rng.uniform(0.3, longest))
             longest = max(1.0, time.monotonic() - begun)
         except subprocess.TimeoutExpired:
+            workers = psutil.Process(run.pid).children(recursive=True)
             os.killpg(run.pid, signal.SIGKILL)
             run.wait()
+            psutil.wait_procs(workers, timeout=5)  # a write that has begun ends first
             struck += 1
         finished = (
             {name for name in contents(out) if not name.startswith(".")}
