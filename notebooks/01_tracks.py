@@ -63,7 +63,7 @@ from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 record = NotebookRecord("01_tracks", globals())
-gap_reason = "longer silences are other people as often as not"
+gap_reason = "after a longer gap the next row is another person in about half of the cases"
 files, options = record.cache.files(), record.cache.method.read_options()
 raw = readers.read_raw(files, recipe=options)
 people = clock.to_clock(raw, max_gap=options.max_gap)

@@ -81,7 +81,8 @@ record.figure(plots.draw_hull_and_zones(zone, points), "hull")
 # Parameters, with sources
 parameters(
     [
-        ("outliers", "0.2 % of the samples, 20 neighbours", PAPER, "as in chapter 03"),
+        ("outliers", "0.2 % of the samples", PAPER, "sec. 2, as in chapter 03"),
+        ("neighbours of a sample", outliers.N_NEIGHBOURS, ASSUMED, "scikit-learn's default"),
         ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
         ("speed", "of the reference pedestrian, at the sample", PAPER, "not the mean of the encounter"),
         ("slices", f"{speeds} m/s", ASSUMED, "the paper shows a range of speeds"),
@@ -196,7 +197,7 @@ record.figure(fig, "slice")
 # </details>
 
 # %% [markdown]
-# ## More people, a smaller zone
+# ## The number of people
 #
 # **What do you think?** We forget nine of ten encounters and do the same again. Is the zone larger or smaller?
 
@@ -435,7 +436,7 @@ Markdown(
     f"""**What we know now.** {len(vertices)} of {len(points):,} samples make the hull, and its slice at
 {zone_speed:g} m/s leaves a zone whose smallest ellipse is {fitted.semi_axes[0]:.2f} m x {fitted.semi_axes[1]:.2f} m. The
 zone is smallest at {smallest:.2f} m/s; near {low:.1f} m/s, where condition 4 ends the data, and near {high:.1f} m/s,
-where few people walk so fast, the hull closes and the zone is large. It shrinks with every encounter that is added: chapter 05 estimates one that does not, and says how far to
+where few people walk so fast, the hull closes and the zone is large. Another encounter never makes it larger, and makes it smaller if somebody comes nearer than the hull allows: chapter 05 estimates a zone that does not depend on their number, and says how far to
 trust it."""
 )
 

@@ -409,7 +409,7 @@ few people come to the edge of my zone behind.
 # ## The plaza and a real day, side by side
 #
 # The plaza is made of people whose zone we know. The real day is 2012-10-24 in the ATC mall in Osaka, thinned to 1 Hz
-# (from 12 to 13 h with a tenth of the people). The paper has 92 days of 10 to 40 Hz. A copy of this chapter on the real day is in
+# (from 12 to 13 h with a seventh of the people of the next hour). The paper has 92 days of 10 to 40 Hz. A copy of this chapter on the real day is in
 # [real_day/05_zones.ipynb](real_day/05_zones.ipynb).
 
 # %% jupyter={"source_hidden": true}
@@ -453,7 +453,7 @@ first, last = (found["quantile"][n]["a"] for n in (min(found["quantile"]), max(f
 Markdown(
     f"""**What we know now.** At {zone_speed:g} m/s the zone is {kept.semi_axes[0]:.2f} m x {kept.semi_axes[1]:.2f} m. In each
 direction some {100 * q:g} % of the encounters come nearer. These are different encounters in each direction, so more than
-{100 * q:g} % enter the zone somewhere. Other people would have given {row["a_low"]:.2f} to {row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
+{100 * q:g} % enter the zone somewhere. The 95 % interval of the longer semi-axis is {row["a_low"]:.2f} to {row["a_high"]:.2f} m. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
 semi-axis changed by {100 * (last - first):+.0f} cm. This describes where people were. Do they keep out of this zone, or is it only empty?
 Chapter 06 asks, and estimates the zone that the robot keeps."""
 )

@@ -223,7 +223,7 @@ alarms = nobody.groupby(["kinds", "bunch"])["alarm"].agg(["sum", "size"])
 trials = [*alarms.itertuples(index=False), alarms.sum()]
 intervals = [binomtest(*row).proportion_ci() for row in trials]
 record.check(
-    "where people ignore each other, no more than 5 % of crowds are false alarms, by the 95 % interval of each kind and of all",
+    "where people ignore each other, the false alarms do not contradict 5 %: the 95 % interval of each kind and of all begins below it",
     all(low <= 0.05 for low, _ in intervals),
     ", ".join(
         f"{kinds}, bunches of {bunch}: {row['sum']} in {row['size']}"
@@ -483,9 +483,9 @@ record.figure(fig, "n-curve")
 # <details><summary>Answer</summary>
 #
 # The hull, and the radius in the null model. The hull shrinks as people are added, because the nearest of more people is
-# nearer. In the null model the mean radius goes to 0, as it should. The radius of the respect zone stays, and its band
-# becomes narrower. The last point of each panel is a single draw of all encounters, and one crowd by chance may show any
-# radius: so p decides, not R.
+# nearer. In the null model the mean radius goes to 0, as it should. The radius of the respect zone stays. Its band closes
+# at the last points only because each draw is then nearly all of the data: the band is no interval. The last point of each
+# panel is a single draw of all encounters, and one crowd by chance may show any radius: so p decides, not R.
 #
 # </details>
 
@@ -529,9 +529,9 @@ people = corners[corners["site"] == "magni"].set_index("every")
 cut = [f"{100 * row.nearer:.0f} cm ({100 * row.nearer_in_one_of_20:.0f} cm)" for row in people.itertuples()]
 Markdown(
     "A position was recorded every 1 s on the ATC day, and every 0.8 s at Grand Central. A path is straight between two of them, so "
-    "somebody who steps aside there seems nearer. By how much? From people of THOR-MAGNI, recorded every 0.4 s, one position every "
-    f"{', '.join(f'{each:g} s' for each in people.index)} was kept: they seem {', '.join(cut)} nearer, in the mean (and in one pair of 20). "
-    "Both radii may be that much too small. Where half of an interval is narrower, the zone is *undecided*."
+    "somebody who steps aside there seems nearer. By how much? The paths of THOR-MAGNI are recorded every 0.4 s. Of each of them, one point every "
+    f"{', '.join(f'{each:g} s' for each in people.index)} was kept: people seem {', '.join(cut)} nearer, in the mean (and in one pair of 20). "
+    "Its own paths are straight for 0.4 s, so both radii may be at least that much too small. Where half of an interval is narrower, the zone is *undecided*."
 )
 
 # %% [markdown]
@@ -561,10 +561,9 @@ looks = {
     "atc-1hz": ("ATC day", figures.ORANGE, "s-"),
     "crowd": ("people who ignore each other", figures.GREY, "^:"),
 }
-turns = halves.query("site == 'grand-central' and variable == 'time to collision'")["half"].mean()
 titles = (
     "The distance on the way grows",
-    f"At Grand Central they turn about {turns:.1f} s before",
+    "The time to collision hardly depends on it",
     "The nearest approach grows far less",
 )
 for ax, title, variable in zip(panels, titles, collision.BINS, strict=True):
@@ -597,10 +596,11 @@ nobody reacts there: these are pairs by chance, and only those who come within {
 geometry. Two people who will pass at {collision.CIRCLE} m to the side are never near *and* fast towards each other. So this
 number cannot tell a distance from a time.
 
-The other two can. The **nearest approach** is {spread} at Grand Central, at each speed: a zone says how near people *pass*.
+The **nearest approach** is {spread} at Grand Central, at each speed: a zone says how near people *pass*.
 (The radius $R$ above is larger: at $R$ the ratio is above 1/2, with the careless and those who step aside.)
-The **time to collision** says when they turn: {time.min():.1f} to {time.max():.1f} s before they touch, later than on the
-black line ({least:.1f} s or more), where everybody knows the way beforehand. The ATC day has too few pairs for this question.
+The **time to collision** at which pairs are half as frequent is {time.min():.1f} to {time.max():.1f} s there. The black line has
+{least:.1f} s or more, though nobody reacts on it: this number alone does not show when people turn. The ATC day has too few
+pairs for this question.
 
 A robot needs both: the zone for how near it passes, a time for how early it gives way. The barrier of chapter 07 has
 both: it lets the robot use up a share of the distance to the zone in each step.
@@ -612,8 +612,8 @@ both: it lets the robot use up a share of the distance to the zone in each step.
 # ## Three common mistakes
 #
 # - **"Nobody was there, so people keep out."** No. Compare with chance first: around anybody there is an empty place.
-# - **"p = 0.048: people ignore each other with a probability of 4.8 %."** No. *If* they ignored each other, so large a
-#   statistic would come up in 4.8 % of all cases.
+# - **"p = 0.048: people ignore each other with a probability of 4.8 %."** No. *If* they ignored each other, a
+#   statistic at least as large would come up in at most 4.8 % of all cases. Twenty shifted crowds cannot show less.
 # - **"A small p means a large distance."** No. p says how clear the distance is, $R$ how large. A million encounters make
 #   p small for a distance of 10 cm. Nor does a small p make a zone usable: on the ATC day p is small, but the verdict is
 #   *undecided*. The tracker loses people who are nearer than 0.9 m.

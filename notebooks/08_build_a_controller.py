@@ -571,7 +571,8 @@ Markdown(
     + "; ".join(
         f"{', '.join(f'{low[g, n]:.2f}' for n in (1, 2, 8))} m with gamma = {g:g}" for g in (0.05, 0.2, 0.8)
     )
-    + ". The larger gamma, the later the robot brakes, and the farther it has to look.\n\n</details>"
+    + ". A large gamma lets the robot come near at full speed, so it must look farther. With the others one step is enough here, because "
+    "the robot can turn aside; in chapter 07 it could only brake.\n\n</details>"
 )
 
 

@@ -260,7 +260,7 @@ Markdown(
 # ## From the front, from behind
 #
 # The same meeting with the person turned around. The paper: from the front it starts earlier, because the zone
-# reaches farther ahead. **What do you think?** By how many centimetres?
+# reaches farther ahead. **What do you think?** Which two lengths of the zone decide by how much?
 
 # %%
 for name, scene in (("from the front", scenario), ("from behind", scenario.turn_people())):
@@ -326,7 +326,7 @@ Markdown(
 
 # %% [markdown]
 # The four scenarios were used to choose gamma, so they cannot test the choice. 2,000 random worlds can, with one to
-# five people, and with walls in half of them (notebook 21; made by `python -m studies.gamma_table`). This notebook drives
+# five people, and with walls in half of them (as in notebook 21, with other seeds; made by `python -m studies.gamma_table`). This notebook drives
 # one of these worlds again, to test the table. **What do you think?** Is 0.05 the best there, too?
 
 # %% jupyter={"source_hidden": true}
@@ -358,8 +358,8 @@ record.key |= {"gamma with the fewest worlds with an infeasible step": best, "th
 verdict = (
     "The choice holds."
     if best == ours.name
-    else f"The four scenarios did not choose the best of these: for a robot of your own begin with {best:g}. The lessons "
-    f"keep {ours.name:g}, the value with which the four scenarios were chosen and are shown."
+    else f"The four scenarios did not choose the best of these: for a robot of your own begin with {best:g}, but stay at {usable.min():g} "
+    f"to {usable.max():g} in narrow corridors and passages (notebook 27). The lessons keep {ours.name:g}."
 )
 Markdown(
     f"<details><summary>Answer</summary>\n\nIn {ours['worlds']:,.0f} worlds gamma = {ours.name:g} arrives in {ours['arrived']:.1%} "

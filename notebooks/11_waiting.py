@@ -167,7 +167,7 @@ record.figure(fig, "admissible")
 # Checks, and the answer
 evidence = f"at most {ahead:+.2f} m/s²"
 record.check(
-    "while the robot waits, no admissible acceleration leads towards the passage", ahead < 0.1, evidence
+    "while the robot waits, no admissible acceleration leads towards the passage", ahead <= 0, evidence
 )
 Markdown(
     "<details><summary>Answer</summary>\n\nThose that point back, and some to the side. "
@@ -327,7 +327,9 @@ for chosen, marker, colour, label in kinds:
 ax.axhline(0, color=figures.BLACK, linewidth=0.8)
 failing = np.array(paces)[unsolved > 0]
 ax.set_title(
-    f"From {failing.min():g} m/s on some steps have no plan" if failing.size else "Every step has a plan"
+    f"Steps without a plan: at {', '.join(f'{each:g}' for each in failing)} m/s"
+    if failing.size
+    else "Every step has a plan"
 )
 ax.set(xlabel="speed of the person [m/s]", ylabel="least h [cm]")
 ax.legend(loc="lower right")
@@ -376,8 +378,9 @@ lowest = compared.groupby("chain", sort=False)["min_h"].min()
 record.check("h >= 0 with every chain of settings", lowest.min() >= 0, f"least h {lowest.min():.2f} m")
 
 # %% [markdown]
-# A dash means: no change of more than 0.25 s, 2 cm of h or 5 cm/s, and the same side and claims. So the barrier is not
-# the reason why our robot passes on the right: the rule of the side is.
+# A dash means: no change of more than 0.25 s, 2 cm of h or 5 cm/s, and the same side and claims. Here our zone alone changes
+# the side, and so does the rule of the side alone. With the rule the side does not depend on the tilt of a zone
+# ([chapter 9](09_passing.ipynb)).
 
 # %% [markdown]
 # ## Try it: who goes first
@@ -427,7 +430,7 @@ Markdown(
 # What we know now
 Markdown(
     "**What we know now.** Waiting and making room need no rule of their own: the robot waits where no acceleration that "
-    f"obeys eq. 1 leads into the passage ({between:.1f} s after the person is out it goes in), and goes back where the limit of its "
+    f"obeys eq. 1 leads into the passage ({between:.1f} s after the person is out it goes in), and turns back just before the limit of its "
     f"speed is negative, which is nearer than h = {stand:.2f} m. "
     "Because it plans less than a second ahead, it sometimes goes in and has to come out again. "
     "So far there was one person. Many people, and walls that form a dead end, need more: chapter 12."

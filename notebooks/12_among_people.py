@@ -217,7 +217,8 @@ print(
 #
 # **What do you think?** The robot (blue) goes to the right. On the left three people stand side by side. In
 # the middle three people come towards it, 2.1 m from one to the next, at 0.7 m/s. On the right somebody
-# stands in the nearer of two doors. Draw the ways that you see. Which one does the robot take?
+# stands in the nearer of two doors, as in the worked number. Draw the ways that you see. Which one does the robot take on the
+# left, and which one in the middle?
 
 
 # %% jupyter={"source_hidden": true}
@@ -529,7 +530,7 @@ shown.rename_axis(None).rename_axis(None, axis=1).style.format("{:.2f}").format(
 # about as often as `among_people()`, and is in zones for much longer. The last row is what the recorded people did
 # themselves: their time is not quite 1, because a way ends where its goal is 0.5 m away.
 #
-# szlib's defaults look for no way. They wait where people walk, and people who do not see the robot take their zones to
+# szlib's defaults look for no way. They wait where people walk, and people who do not see the robot walk up to
 # it. So they are in zones for longer than `among_people()`, which is out of the way in time.
 
 # %% [markdown]

@@ -172,6 +172,8 @@ print(f"Beside the learned zone the robot keeps {100 * beside:.1f} cm more than 
 # $d = 0.5 + 0.5^2/1$ = **0.75 m**. With a margin of 5 cm the robot may go on until $d$ = 0.55 m. That is at
 # $s$ = 0.39 m: its disc is then 11 cm inside the wall.
 #
+# *What do you think: does a longer wall need a larger margin, or a smaller one?*
+#
 # **Always.** At the true distance $s$ straight ahead of an end, $d = s + s^2/L$. The disc touches at $s = r$, and
 # nowhere else on the outline at distance $r$ is $d$ longer (proof in `studies.distances`). So the margin must be
 #
@@ -189,9 +191,6 @@ def distance_ahead(s, length):
 own = distance_ahead(0.5, 1.0)
 library = szlib.segment_distance((1.0, 0.0), start, end)  # the wall from (-0.5, 0) to (0.5, 0)
 f"by hand {own:.2f} m, szlib {library:.2f} m"
-
-# %% [markdown]
-# *What do you think: does a longer wall need a larger margin, or a smaller one?*
 
 # %% jupyter={"source_hidden": true}
 # Figure

@@ -126,7 +126,7 @@ print(f"mean speed: {from_frames.mean():.2f} m/s from frames, {from_seconds.mean
 # | irregular frames | times between frames differ | bring all people to one clock |
 # | gap: a person is lost for a while | one time between two rows is long | end the track; make up no positions |
 # | jump: another person, or an error of the sensor | a speed that nobody runs | warn above 100 m; smaller ones show in the fastest second (chapter 01) |
-# | swapped ids: two people who come close exchange their ids | nothing, or a sharp turn | leave out the nearest encounters (chapter 03) |
+# | swapped ids: two people who come close exchange their ids | nothing, or a sharp turn | no repair; an encounter that is near and alone is removed (chapter 03) |
 # | wrong unit or clock | people move at 1,000 m/s, or nobody walks | refuse the file, and suggest another reading |
 #
 # The next figure has three curves. Each says for which share of frames, or of people, a time is at most so long. *A
@@ -270,14 +270,16 @@ if record.cache.is_synthetic:
     record.check("each line of the files entered the funnel", rows == lines, found_rows, always=True)
 extraction.table[["day", "files", "rows", "unusable", "encounters"]].head(7)
 
+# %% jupyter={"source_hidden": true}
+# The answer
+Markdown(
+    f"<details><summary>Answer</summary>\n\n{1e6 * len(samples) / max(rows, 1):,.0f} of a million: {len(samples):,} samples of "
+    f"{n_encounters:,} encounters, 0.1 s apart. Most rows are dropped at one stage: a window of 3 s can open at a row only if both "
+    "people are seen throughout, near enough, and alone. The stages before it drop next to nothing in a good file; where they do, "
+    "look at the file.\n\n</details>"
+)
+
 # %% [markdown]
-# <details><summary>Answer</summary>
-#
-# Most rows are dropped at one stage: a window of 3 s can open at a row only if both people are seen throughout, near
-# enough, and alone. The stages before it drop next to nothing in a good file; where they do, look at the file.
-#
-# </details>
-#
 # ## Ninety-two days
 #
 # `szlib extract atc/*.csv --out days --jobs 4 --exclude 2012-11-11` writes a Parquet file and a funnel for each day. In

@@ -316,9 +316,11 @@ record.claim(
     stuck["MPC-CBF"] < 1,
     f"it arrives in {stuck['MPC-CBF']:.0%} of the variations",
 )
+gap = change[change["metric"] == "success"].set_index(["controller", "meeting"])
+there = gap.loc[("MPC-CBF, bolder", "robot crowding"), ["mean", "low", "high"]]
 record.claim(
-    "crowded in, the bolder controller finds the gap at least as often",
-    stuck["MPC-CBF"] <= stuck["MPC-CBF, bolder"],
+    "crowded in, the bolder controller finds the gap more often",
+    True if there["low"] > 0 else None,  # undecided where the interval holds 0
     f"in {stuck['MPC-CBF, bolder']:.0%} of 12 variations, the other in {stuck['MPC-CBF']:.0%}",
 )
 

@@ -174,7 +174,10 @@ for row, scene in zip(grid, ("waiting", "making_room"), strict=True):
     row[0].set_ylabel(f"{scene.replace('_', ' ')}\ngamma")
 for ax in grid[-1]:
     ax.set_xlabel("width [m]")
-fig.suptitle("In a passage gamma from 0.05 to 0.07 works with nearly every width and zone")
+passage = atlas[(atlas["scene"] != "corridor") & (atlas["pace"] == 0.5)]
+arrived = (~passage["strategy"].isin(["h < 0", "infeasible", "deadlock"])).groupby(passage["gamma"])
+works, cases = arrived.sum(), arrived.size().iloc[0]
+fig.suptitle(f"In a passage gamma = 0.07 works in {works[0.07]} of {cases} cases, 0.05 in {works[0.05]}")
 figures.add_shared_legend([grid[0, 0]])
 record.figure(fig, "passage")
 
@@ -300,7 +303,7 @@ Markdown(
 
 # %% [markdown]
 # **A common mistake:** "a small zone is always the safe choice for the robot". No: in a passage of 3 m, with half the zone, the
-# robot stays inside beside the person, and is squeezed against the wall.
+# robot stays inside beside the person who walks at 0.5 m/s, and h falls 5 mm below 0.
 #
 # **What it means.** The size of the zone trades yielding against time, as the paper says, and so does gamma.
 # Neither is free. On one side of the maps the robot is pushed back until time is up. On the other side it drives

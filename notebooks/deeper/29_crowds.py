@@ -158,7 +158,9 @@ parts = [
 mine = pd.concat(parts) if parts else pd.DataFrame(columns=["unexplained"])
 unexplained = int(mine["unexplained"].sum())
 evidence = f"{unexplained} unexplained in {len(mine)} worlds"
-record.check("every broken promise is explained: random worlds", unexplained == 0, evidence, always=True)
+record.check(
+    "every violated safety claim is explained: random worlds", unexplained == 0, evidence, always=True
+)
 quick = " and metric == 'path_efficiency' and controller.str.startswith('MPC')"  # of trials without data
 saved = record.committed_table("29_crowds", crowd_trials.recompute, where=f"crowd in {models}{quick}")
 
@@ -210,7 +212,9 @@ table = pd.DataFrame(
 )
 unexplained = table.loc["unexplained", "robot"] * len(made)
 evidence = f"{unexplained:.0f} unexplained on {len(made)} ways"
-record.check("every broken promise is explained: recorded people", unexplained == 0, evidence, always=True)
+record.check(
+    "every violated safety claim is explained: recorded people", unexplained == 0, evidence, always=True
+)
 record.table(table.round(4).reset_index(names="metric"), "29_replay")
 table.drop(index="unexplained").round(2)
 
@@ -233,20 +237,20 @@ record.figure(fig, "replay")
 
 # %% jupyter={"source_hidden": true}
 # Checks
-promises = record.committed_table(
-    "29_safety_claims", crowd_trials.recompute_promises, where=f"crowd in {models}"
+safety_claims = record.committed_table(
+    "29_safety_claims", crowd_trials.recompute_safety_claims, where=f"crowd in {models}"
 )
 counted = ["trials", "claimed_safe_steps", "broken_steps", *MOTION_CHANGES, "unexplained", "to_who_kept"]
-total = promises[counted].sum().astype(int)
+total = safety_claims[counted].sum().astype(int)
 of_all = f"of {total['claimed_safe_steps']:,} steps that claimed to be safe"
 record.check(
-    "no promise was broken to anybody who kept their velocity",
+    "no safety claim was violated against a person who kept their velocity",
     total["to_who_kept"] == 0,
     f"{total['to_who_kept']} {of_all}",
     always=True,
 )
 record.check(
-    "every broken promise is explained by what people did",
+    "every violated safety claim is explained by what people did",
     total["unexplained"] == 0,
     f"{total['broken_steps']} {of_all} led to h < 0; {total['unexplained']} unexplained",
     always=True,
@@ -254,10 +258,14 @@ record.check(
 
 # %% jupyter={"source_hidden": true}
 # Figure
-by_crowd = promises[promises["controller"] == "MPC-CBF"].groupby("crowd", sort=False).sum(numeric_only=True)
+by_crowd = (
+    safety_claims[safety_claims["controller"] == "MPC-CBF"]
+    .groupby("crowd", sort=False)
+    .sum(numeric_only=True)
+)
 ax = plots.plot_safety_claims(by_crowd[[*MOTION_CHANGES, "claimed_safe_steps"]])
 ax.set_title("szlib's defaults: people break claims by appearing and turning")
-record.figure(ax.figure, "promises")
+record.figure(ax.figure, "safety-claims")
 
 # %% [markdown]
 # ## A larger gamma
@@ -365,8 +373,8 @@ cells.loc["1 m/s"].round(2)
 sensitive = read_table("29_sensitivity").pivot(index="change", columns="metric", values="mean")
 arrive = sensitive["reached"].agg(["min", "max"])
 record.claim(
-    "with each tuned number halved or doubled, at least 95 % of the ways end at the goal",
-    arrive["min"] >= 0.95,
+    "with each tuned number halved or doubled, at most one way more or less of 45 ends at the goal",
+    (45 * (arrive - sensitive.loc["as it is", "reached"])).abs().max() < 1.5,
     f"{arrive['min']:.0%} to {arrive['max']:.0%}",
 )
 order = sensitive[[*of_ways, "time_ratio"]].sort_values("time_intruding")
@@ -423,10 +431,10 @@ groups.agg(
 
 # %% [markdown]
 # The rows of a controller differ in the zone (a body of 0.3 m, or Grand Central's learned one), the time step and
-# the limit of acceleration. Both MPC-CBF do far better than the others, and the learned zone is better than the
-# body alone, although these people were taught no zone. The controller among people arrives some 3 s earlier than
-# the paper's. It needs the acceleration: with the learned zone and 1 m/s² it collides more often than the paper's
-# settings, which keep farther away. So the paper's controller is a good choice where few people are near.
+# the limit of acceleration. Both MPC-CBF do far better than the others. With the learned zone the paper's
+# controller collides less often than with the body alone, although these people were taught no zone, and times out more
+# often. The controller among people arrives some 3 s earlier than the paper's. It needs the acceleration: with the
+# learned zone and 1 m/s² it collides more often than the paper's settings, which keep farther away.
 
 # %% [markdown]
 # ## Around groups, not through them
@@ -450,8 +458,9 @@ shares.style.format("{:.1%}").set_caption("Ways on which a group was crossed, by
 
 # %% [markdown]
 # The robot crosses a quarter as many groups as people do. Whether it knows of them does not matter here: all three rows
-# are the same. Companions are mostly so near each other that their zones leave no room between them. So it is the
-# zone that keeps the robot out of groups. The price of a group acts where people stand in a wide circle (chapter 12).
+# are the same. Companions are mostly so near each other that their zones leave no room between them, which may be the
+# reason; a robot without zones was not tried. The search for ways has a price between two people of a group besides
+# (`szlib.control.ways.GROUP_SECOND`), for people who stand in a wide circle.
 #
 # ## Two wheels
 #

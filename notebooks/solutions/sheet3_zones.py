@@ -200,7 +200,7 @@ judges.check("p_value", p_value)
 #
 # The null model keeps each person's path and moves it in time. Samples have times `t` [s], from 0 to
 # `period`, and belong to `person` (its number, from 0), both of shape (n,); `shift` says by how much
-# each person is moved, one number a person [s], of either sign. Give the new times. Who is moved past
+# each person is moved, one number a person [s], of either sign. Give the new times. A person who is moved past
 # the end of the recording comes in at its beginning.
 
 

@@ -72,7 +72,7 @@ SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intr
 
 
 def measure(log: SimulationLog) -> dict[str, float]:
-    """Scores, and broken promises by what people did."""
+    """Scores, and violated safety claims by what people did."""
     broken = safety_violations(log)
     counts = {did: float((broken["change"] == did).sum()) for did in MOTION_CHANGES}
     rest = {
@@ -88,7 +88,7 @@ def measure(log: SimulationLog) -> dict[str, float]:
 def violated_by_who_kept(log: SimulationLog) -> int:
     """Steps that said they were safe, times people with h < 0 then who went on as they had been seen.
 
-    From positions alone, by the sum of the distances to the two foci: nothing of `promises` or `log.h`.
+    From positions alone, by the sum of the distances to the two foci: nothing of `count_safety_claims` or `log.h`.
     """
     count, s = 0, log.settings
     for k in np.flatnonzero(log.safe[:-1]):
@@ -160,7 +160,7 @@ def recompute(row: pd.Series) -> dict[str, float]:
 
 
 @study("29_safety_claims", notebook="29")
-def recompute_promises(row: pd.Series) -> dict[str, float]:
+def recompute_safety_claims(row: pd.Series) -> dict[str, float]:
     """The steps of the trial `PROBE` that claimed to be safe, and its path, again."""
     again = probe(row)
     return {f"probe_{name}": again[name] for name in PROBED}
@@ -216,8 +216,8 @@ def zone_of(site: str) -> szlib.Ellipse:
     return szlib.SocialZone.fit(samples, method=quantile_zone.NAME).ellipse(1.1)
 
 
-def promises(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row each crowd and controller: trials, steps, and what became of the promises."""
+def count_safety_claims(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row each crowd and controller: trials, steps, and how many safety claims held."""
     of_mpc = rows[rows["controller"].str.startswith("MPC")]
     sums = [
         "steps",
@@ -249,7 +249,7 @@ def main(n: int, work: Path | None) -> None:
     for rows in chain(reacting(n, work), recorded(n, work)):
         parts.append(rows)
         print(*rows[list(BY)].iloc[0], len(rows), flush=True)
-    table = promises(pd.concat(parts, ignore_index=True))
+    table = count_safety_claims(pd.concat(parts, ignore_index=True))
     write_table(pd.concat(map(means, parts), ignore_index=True), "29_crowds")
     write_table(table, "29_safety_claims")
     print(table.to_string())
