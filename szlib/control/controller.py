@@ -72,20 +72,19 @@ def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) ->
     inputs : the first k accelerations of a plan, shape (k, 2) [m/s2].
     s : settings: the lengths of the steps, and a_max.
     """
-    states = [np.array(state)]
     held = s.dt * np.array(s.step_lengths[: len(inputs)])
-    for control, dt in zip(inputs, held, strict=True):
-        states.append(advance(states[-1], control, dt))
-    position, velocity = np.split(states[-1], 2)
-    fastest = max(np.abs(velocity).max(), 1e-12)  # no division by 0 at rest
+    velocities = np.vstack([state[2:], held[:, None] * inputs]).cumsum(axis=0)
+    last = velocities[-1]
+    fastest = max(np.abs(last).max(), 1e-12)  # no division by 0 at rest
     piece = s.dt * max(1, ceil(fastest / s.a_max / s.dt / _MOST_PIECES))
-    speeds = np.append(np.arange(fastest, 0.0, -s.a_max * piece), 0.0)
-    gone = (piece * (speeds[1:] + speeds[:-1]) / 2).cumsum() / fastest
-    braked = np.full_like(gone, piece)
-    points = np.vstack([np.array(states)[:, :2], position + gone[:, None] * velocity])
-    times = np.concatenate([[0.0], held, braked]).cumsum()
-    largest = np.append(np.hypot(*inputs.T), np.full_like(gone, 2**0.5 * s.a_max))
-    return Path(points, times, largest * np.diff(times) ** 2 / 8)
+    slower = np.append(np.arange(fastest, 0.0, -s.a_max * piece)[1:], 0.0) / fastest
+    velocities = np.vstack([velocities, slower[:, None] * last])
+    lengths = np.append(held, np.full_like(slower, piece))
+    moved = lengths[:, None] * (velocities[1:] + velocities[:-1]) / 2
+    points = np.vstack([state[:2], moved]).cumsum(axis=0)
+    times = np.append(0.0, lengths).cumsum()
+    changes = np.hypot(*(velocities[1:] - velocities[:-1]).T)
+    return Path(points, times, changes * lengths / 8)
 
 
 class DoubleIntegrator:

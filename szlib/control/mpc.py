@@ -413,15 +413,17 @@ class MPCCBF(Controller):
     def _bound_bodies(self, bodies: Obstacles, path: Path) -> Bound:
         """How near the disc comes to `bodies`, or towards those that it overlaps, while it moves."""
         begin = path.points[0]
-        if np.hypot(*np.ptp(path.points, axis=0)) <= AT_REST * self._s.dt:
+        moved = path.points - begin
+        if np.hypot(*moved.T).max() <= AT_REST * self._s.dt:
             return Bound()
         overlaps = bodies.gaps(*begin) < -TOLERANCE
+        if not overlaps.any():
+            return bodies.bound(path)
         bound = bodies.select_near(np.where(overlaps, inf, 0.0)).bound(path)
-        if overlaps.any():
-            places = bodies.groups[0].numbers[overlaps, :2]
-            towards = float(((places - begin) @ (path.points - begin).T).max())
-            if towards > 0:
-                bound = Bound(min(bound.lower, -towards), min(bound.seen, -towards))
+        places = bodies.groups[0].numbers[overlaps, :2]
+        towards = float(((places - begin) @ moved.T).max())
+        if towards > 0:
+            bound = Bound(min(bound.lower, -towards), min(bound.seen, -towards))
         return bound
 
     def _make_scene(

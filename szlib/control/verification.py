@@ -238,7 +238,7 @@ def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
         nearer = ((places - points[0]) @ moved.T > TOLERANCE).any(axis=1)
         overlaps = gaps[: len(places), 0] < -TOLERANCE
         is_hit: Array = np.where(overlaps, nearer, touches[: len(places)])
-        rests = np.hypot(*np.ptp(points, axis=0)) <= AT_REST * s.dt
+        rests = np.hypot(*(points - points[0]).T).max() <= AT_REST * s.dt
         is_clear.append(bool(rests or not is_hit.any()))
     if step.passively_safe and not any(is_clear):
         yield "the step says that it rests before somebody walks into it; it does not"
