@@ -119,7 +119,7 @@ def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
 
 
 def file_state(path: Path) -> Any:
-    """Device, inode, size and times of the file `path`."""
+    """Inode, size and times of the file `path`."""
     with opening(path):
         return _STATE(path.stat())
 

@@ -317,7 +317,7 @@ def extract_days(
     of_recipe = {name: parameters.pop(name) for name in names & parameters.keys()}
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     excluded = {exclude} if isinstance(exclude, str) else set(map(str, exclude))
-    files = sorted({file.resolve() for file in datasets.find(paths)})
+    files = sorted({file.absolute() for file in datasets.find(paths)})
     recipe = find_recipe(files, recipe, **of_recipe)
     folder = claim_folder(out, PURPOSE)
     days: dict[str, dict[Path, Any]] = {}

@@ -21,6 +21,7 @@ import pooch
 
 from ..core.errors import DataError
 from ..core.input_files import explain_errors, printable
+from .recipe import FILE_NAME
 
 SYNTHETIC = "synthetic"
 # A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network.
@@ -131,7 +132,7 @@ def _expand(name: str | Path) -> list[Path]:
         root = Path(path.anchor)
         found = [path] if path.exists() else [*root.glob(str(path.relative_to(root)))]
         if path.is_dir():
-            found = [file for file in path.iterdir() if not file.name.startswith(".")]
+            found = [file for file in path.glob("[!.]*") if file.name != FILE_NAME]
     files = sorted(filter(Path.is_file, found))
     if not files:
         raise DataError(

@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from ..tracks.recipe import Recipe
 
 _STOPPED = "stopped; finished results stay in their folder"
-# Errors of standard output or standard error that is full or closed.
-_BROKEN_STREAM = (OSError, ValueError)
+# Errors of standard output or standard error that is full, closed or missing (None).
+_BROKEN_STREAM = (OSError, ValueError, AttributeError)
 # Numbers of errors of writing; those of files, not of streams, have a file name.
 _UNWRITABLE = (errno.EBADF, errno.EFBIG, errno.EIO, errno.ENOSPC)
 
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that `arguments` name (default: those of the process) and return its exit code."""
     # print escapes where the terminal's encoding lacks a letter
     for stream in (sys.stdout, sys.stderr):
-        with suppress(*_BROKEN_STREAM, AttributeError):
+        with suppress(*_BROKEN_STREAM):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     try:
         with _stop_on_signals(), warnings.catch_warnings():
@@ -62,7 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
             with environment(**memory or {}):
                 code = int(options.command(options))
-            sys.stdout.flush()
+            if sys.stdout:
+                sys.stdout.flush()
         return code
     except KeyboardInterrupt as stop:
         _print_error(_STOPPED)
@@ -123,7 +124,7 @@ def _read_options(options: argparse.Namespace, data: Sequence[str]) -> Recipe:
     from ..tracks.recipe import Recipe, find_recipe
 
     is_named = any(name in datasets.NAMES for name in data)
-    files = [] if is_named or any(map(os.path.isdir, data)) else datasets.find(data)
+    files = [] if is_named else datasets.find(data)
     columns: dict[str, str | int] = {}
     for pair in filter(None, re.split(r",(?=[a-z]+=)", ",".join(options.columns))):
         name, equals, column = pair.partition("=")

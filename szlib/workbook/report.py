@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
-import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
@@ -28,7 +27,7 @@ from ..core.files import write_file
 from ..core.input_files import printable
 from ..plaza.settings import PlazaSettings
 from ..simulation import SCENARIOS
-from ..tracks import datasets, funnels
+from ..tracks import datasets
 from . import folders
 from .claims import NOT_RUN, judge_sentences
 from .figures.movies import read_scripts
@@ -153,7 +152,7 @@ def _render_front_page(
         claims=judge_sentences(named).query("kind == 'claim'").to_dict("records"),
         named=named,
         notebooks=list(notebooks),
-        stages=_list_stages(home / "encounters.parquet"),
+        stages=summary.get("stages", []),
         zone=_show_zone(home / "zone.json", speed, is_synthetic=is_synthetic),
         scenarios={each.title: name for name, each in SCENARIOS.items()},
     )
@@ -162,14 +161,6 @@ def _render_front_page(
 
 # What the summary of a run says of it in one line each.
 _DESCRIBED = ("data", "area", "date", "command", "machine", "szlib", "versions")
-
-
-def _list_stages(samples: Path) -> list[dict[str, Any]]:
-    """The stages of the encounters in the file `samples`; none without a file."""
-    if not samples.exists():
-        return []
-    table = funnels.table(funnels.get(pd.read_parquet(samples, columns=[])))
-    return table.to_dict("records")  # type: ignore[return-value]
 
 
 def _complete_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:

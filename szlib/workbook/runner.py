@@ -6,6 +6,7 @@ summary.json and writes the report.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import platform
@@ -26,9 +27,8 @@ from filelock import FileLock
 from joblib import Parallel, delayed
 from tqdm import tqdm
 
-from .. import __version__
 from ..core.errors import DataError, StorageError
-from ..core.files import write_file
+from ..core.files import load_cached, write_file
 from ..core.input_files import MEMORY_VARIABLE, explain_errors, memory_limit
 from ..core.parallel import limit_jobs, safe_path
 from ..tracks import datasets, funnels
@@ -91,7 +91,9 @@ def run(
     data = folders.absolute_data(data)
     home = folders.claim_results(root, data, given)
     with _folder_lock(home), safe_path():
-        source = _describe_source(home, data, given)
+        made_of = _find_source(home, data, given)
+        source = {name: made_of[name] for name in ("szlib", "data", "files")}
+        source["parameters"] = given
         names = [script.stem for script in scripts]
         outcomes = _stored_outcomes(home, source, known)
         outcomes |= dict.fromkeys(names, NOT_STARTED)
@@ -103,7 +105,7 @@ def run(
         for name, outcome in _execute_all(scripts, variables, home, jobs, figures):
             outcomes[name] = outcome
             _store(home, unfinished)
-        source |= _describe_machine() | _describe_data(home, source, outcomes)
+        source |= _describe_machine() | _describe_data(home, source, made_of, outcomes)
         summary = _store(home, _summarise(source, outcomes))
         if any((home / f"{name}.ipynb").exists() for name in outcomes):
             # importing it takes longer than all other imports
@@ -128,17 +130,13 @@ def _folder_lock(folder: Path) -> Iterator[None]:
         yield
 
 
-def _describe_source(
+def _find_source(
     home: Path, data: str | Sequence[str], given: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """What the results of a run depend on: version, data with the content of its files, parameters."""
-    cache = DataCache(home, data, seed=given.get("seed", 0))
-    return {
-        "szlib": __version__,
-        "data": datasets.label(data),
-        "files": cache.source()["files"],
-        "parameters": given,
-    }
+    """What the encounters of a run are made of, as of `DataCache.source`."""
+    method = ZoneMethod.from_variables(given)
+    area = given.get("area", "")
+    return DataCache(home, data, area, given.get("seed", 0), method).source()
 
 
 def _describe_machine() -> dict[str, Any]:
@@ -153,18 +151,26 @@ def _describe_machine() -> dict[str, Any]:
 
 
 def _describe_data(
-    home: Path, source: Mapping[str, Any], outcomes: Mapping[str, Any]
+    home: Path,
+    source: Mapping[str, Any],
+    made_of: Mapping[str, Any],
+    outcomes: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Area, warnings and verdict of the data of a run, from the encounters and the zone in `home`."""
+    """Stages, area, warnings and verdict of the data of a run, from the encounters and the zone in `home`.
+
+    Encounters that are not `made_of` this data and these parameters are left out.
+    """
     found: dict[str, Any] = {}
     zone = read_stored_zone(home / "zone.json")
     samples = home / "encounters.parquet"
     if zone and zone.provenance.get("source", {}).get("files") == source["files"]:
         speed = ZoneMethod.from_variables(source["parameters"]).zone_speed
         found["verdict"] = f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
-    if samples.exists():
-        table = pd.read_parquet(samples, columns=[])
-        found["warnings"] = funnels.warnings(funnels.get(table))
+    if content := load_cached(samples, made_of):
+        table = pd.read_parquet(io.BytesIO(content), columns=[])
+        stages = funnels.get(table)
+        found["stages"] = funnels.table(stages).to_dict("records")
+        found["warnings"] = funnels.warnings(stages)
         found["area"] = "{area} {area_reason}".format_map(table.attrs).strip()
         is_undecided = any(o["status"] == "undecided" for o in outcomes.values())
         if is_undecided and "verdict" not in found:
