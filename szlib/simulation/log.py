@@ -18,7 +18,7 @@ from ..control import MPCSettings, Person
 from ..control.obstacles import describe, number_kinds, restore
 from ..core.errors import DataError, SzlibError
 from ..core.files import write_file
-from ..core.input_files import open_regular, read_small
+from ..core.input_files import open_regular
 from ..zones.ellipses import Ellipse
 from .metrics import compute_metrics
 from .robot_run import Run, nanmin
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _FORMAT = "szlib.SimulationLog"
-_VERSION = 8
+_VERSION = 9
 _ARRAYS = (
     "states",
     "controls",
@@ -133,15 +133,14 @@ class SimulationLog(Run):
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the run to ``<path>.npz`` (its arrays) and ``<path>.json`` (all else).
+        """Write the run to ``<path>.npz``: its arrays, and all else as a text of JSON, `content`.
 
-        One of these two suffixes of `path` is ignored.  Claims are functions and are not saved.
+        `path` may have this suffix.  Claims are functions and are not saved.
 
         Raises
         ------
         DataError : a file cannot be written.
         """
-        stem = str(path).removesuffix(".npz").removesuffix(".json")
         scenario = self.scenario
         scene = _pick(scenario, "name", "title", "duration")
         for name in ("start", "goal", "walls"):
@@ -164,9 +163,9 @@ class SimulationLog(Run):
             ],
         }
         buffer = io.BytesIO()
-        np.savez_compressed(buffer, **_pick(self, *_ARRAYS))
-        write_file(f"{stem}.npz", buffer.getvalue())
-        write_file(f"{stem}.json", json.dumps(content, indent=1))
+        text = np.array(json.dumps(content, indent=1))
+        np.savez_compressed(buffer, content=text, **_pick(self, *_ARRAYS))
+        write_file(_find_file(path), buffer.getvalue())
 
     @classmethod
     def load(cls, path: str | Path) -> SimulationLog:
@@ -176,15 +175,15 @@ class SimulationLog(Run):
         ------
         DataError : there is no run, it is damaged, or it has another format version.
         """
-        stem = str(path).removesuffix(".npz").removesuffix(".json")
+        file = _find_file(path)
         try:
-            content = json.loads(read_small(Path(f"{stem}.json")))
+            with open_regular(file) as stream:
+                arrays = dict(np.load(stream))
+            content = json.loads(str(arrays.pop("content")))
             if (content["format"], content["version"]) != (_FORMAT, _VERSION):
                 raise ValueError(
                     f"format {content['format']} {content['version']}, expected {_FORMAT} {_VERSION}"
                 )
-            with open_regular(Path(f"{stem}.npz")) as stream:
-                arrays = dict(np.load(stream))
             zones = tuple(Ellipse(**each) for each in content["zones"])
             people = tuple(
                 Person(**person, zone=zone)
@@ -210,8 +209,13 @@ class SimulationLog(Run):
             SzlibError,
         ) as error:
             raise DataError(
-                f"{stem}: cannot be read as a run ({error!r}); expected the two files of SimulationLog.save"
+                f"{file}: cannot be read as a run ({error!r}); expected a file of SimulationLog.save"
             ) from error
+
+
+def _find_file(path: str | Path) -> Path:
+    """The file of a run that is saved to `path`."""
+    return Path(f"{str(path).removesuffix('.npz')}.npz")
 
 
 def _pick(whole: Any, *names: str) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """The four scenarios of the paper, their claims, and the metrics of a run."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -322,6 +321,12 @@ def test_scenarios_are_read_only():
 # --- the log -----------------------------------------------------------------------------------------
 
 
+def rewrite(file, change):
+    """Save the run of `file` with a `change` of the text that it holds."""
+    arrays = dict(np.load(file))
+    np.savez(file, **arrays | {"content": np.array(change(str(arrays["content"])))})
+
+
 def test_a_log_with_an_obstacle_of_an_unknown_kind_is_rejected(tmp_path):
     edge = szlib.control.HalfPlane((0.0, -2.0), (0.0, 1.0))
     log = szlib.simulate(
@@ -332,8 +337,7 @@ def test_a_log_with_an_obstacle_of_an_unknown_kind_is_rejected(tmp_path):
     log.save(tmp_path / "run")
     (back,) = szlib.SimulationLog.load(tmp_path / "run").scenario.obstacles
     assert (type(back), back.numbers) == (type(edge), edge.numbers)
-    file = tmp_path / "run.json"
-    file.write_text(file.read_text().replace('"half-plane"', '"sofa"'))
+    rewrite(tmp_path / "run.npz", lambda text: text.replace('"half-plane"', '"sofa"'))
     with pytest.raises(
         szlib.DataError, match="kind of an obstacle must be that of a class"
     ):
@@ -355,8 +359,8 @@ def test_names_with_a_dot_are_different_runs(tmp_path):
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
 def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
     log = logs[name]
-    log.save(tmp_path / "run.json")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json", "run.npz"]
+    log.save(tmp_path / "run.npz")
+    assert [p.name for p in tmp_path.iterdir()] == ["run.npz"]
     back = szlib.SimulationLog.load(tmp_path / "run")
     pd.testing.assert_frame_equal(back.table, log.table, check_exact=True)
     assert back.metrics() == log.metrics()
@@ -370,10 +374,10 @@ def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
 def test_a_log_of_another_version_of_szlib_is_loaded(logs, tmp_path):
     log = logs["passing"]
     log.save(tmp_path / "run")
-    file = tmp_path / "run.json"
-    content = json.loads(file.read_text(encoding="utf-8"))
-    assert content["szlib"] == szlib.__version__
-    file.write_text(json.dumps(content | {"szlib": "0.1.0"}), encoding="utf-8")
+    file = tmp_path / "run.npz"
+    own = f'"szlib": "{szlib.__version__}"'
+    rewrite(file, lambda text: text.replace(own, '"szlib": "0.1.0"'))
+    assert '"szlib": "0.1.0"' in str(np.load(file)["content"])
     pd.testing.assert_frame_equal(szlib.SimulationLog.load(file).table, log.table)
 
 
@@ -388,16 +392,23 @@ def test_a_log_without_people_is_saved_and_loaded(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda folder: (folder / "run.json").unlink(), "FileNotFoundError"),
+        (lambda folder: (folder / "run.npz").unlink(), "FileNotFoundError"),
         (lambda folder: (folder / "run.npz").write_bytes(b"PK\x03\x04"), "BadZipFile"),
         (lambda folder: (folder / "run.npz").write_bytes(b"[]"), "ValueError"),
         (
-            lambda folder: (folder / "run.json").write_text(
-                '{"format": "other", "version": 1}'
+            lambda folder: rewrite(
+                folder / "run.npz", lambda _: '{"format": "other", "version": 1}'
             ),
             "other 1",
         ),
-        (lambda folder: (folder / "run.json").write_text("[]"), "TypeError"),
+        (
+            lambda folder: rewrite(folder / "run.npz", lambda _: "[]"),
+            "TypeError",
+        ),
+        (
+            lambda folder: np.savez(folder / "run.npz", states=np.zeros((2, 4))),
+            "content",
+        ),
     ],
 )
 def test_damaged_logs_are_rejected(logs, tmp_path, change, message):
