@@ -2,7 +2,8 @@
 
 Every file is written here: completely, or not at all. A folder of results holds a marker file, `.szlib`. Its
 first line says what the folder is for. A folder that holds other files and no marker is never written into.
-Neither is a folder that holds the input data. What a killed process left unfinished is removed after an hour.
+Neither is a folder that holds the input data. What a killed process left unfinished in such a folder is
+removed an hour later, by the next one that uses the folder.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ In the folder `out` each day has two files: ``<day>.parquet``, its samples and t
 ``<day>.parquet.json``, their checksum and what they are made of: the content of the day's files, every
 parameter, and the version of szlib.  Each file is written atomically.  A day whose two files match is not
 computed again, so a run that was stopped or killed continues where it ended.  Then a file of the same inode,
-size and times is not even read.
+size and times is not even read.  A day that fails leaves no result, not even an earlier one.
 """
 
 from __future__ import annotations
@@ -196,13 +196,17 @@ class Extraction:
             day = file.name.removesuffix(".parquet.json")
             if day in excluded:
                 continue
-            expected = "one of this version; extract the day again"
-            with reading(file, "as an extracted day", expected):
+            with reading(
+                file,
+                "as an extracted day",
+                "one of this version; extract the day again",
+            ):
                 sources[day] = json.loads(read_small(file))["made_of"]
                 parameters = dict(sources[day]["parameters"])
                 recipe = Recipe(**parameters.pop("recipe"))
-                space = AttentionalSpace(**parameters.pop("space"))
-                settings = EncounterSettings(space=space, **parameters)
+                settings = EncounterSettings(
+                    space=AttentionalSpace(**parameters.pop("space")), **parameters
+                )
             first = next(iter(sources))
             of_day = {"files": None, "states": None}
             if sources[day] | of_day != sources[first] | of_day:
@@ -351,8 +355,9 @@ def extract_days(
         rows.append(_ROW | {"day": day, "files": len(days[day])})
     table = pd.DataFrame(rows, columns=list(_ROW)).sort_values("day", ignore_index=True)
     sources = {row["day"]: row["source"] for row in rows if "source" in row}
-    of_all = common if len(shared) == len(included) else settings
-    return Extraction(folder, table, of_all, recipe, sources, excluded)
+    if len(shared) == len(included):
+        settings = common
+    return Extraction(folder, table, settings, recipe, sources, excluded)
 
 
 def extract_day(
@@ -397,8 +402,9 @@ def extract_day(
                     samples = find_encounters(tracks, settings=settings)
                 source = described.result()
         if status == "done" or source != stored:
-            content = samples.to_parquet(index=False)
-            store_cached(out / f"{day}.parquet", content, source)
+            store_cached(
+                out / f"{day}.parquet", samples.to_parquet(index=False), source
+            )
         read = _add_stages([samples])[0]
         row |= {
             "status": status,
@@ -411,4 +417,6 @@ def extract_day(
         }
     except Exception as error:  # whatever fails in one day, the others go on
         row["why"] = printable(error if isinstance(error, SzlibError) else repr(error))
+        with suppress(OSError):  # the result of an earlier file is not that of this one
+            (out / f"{day}.parquet.json").unlink()
     return row | {"seconds": time.perf_counter() - start}

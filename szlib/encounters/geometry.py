@@ -101,8 +101,7 @@ class Area:
         """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
         if self.is_rectangle:
             west, south, east, north = self.polygon.bounds
-            inside = (west <= x) & (x <= east) & (south <= y) & (y <= north)
-            return np.asarray(inside)
+            return np.asarray((west <= x) & (x <= east) & (south <= y) & (y <= north))
         shapely.prepare(self.polygon)  # once; does nothing the next time
         return np.asarray(shapely.intersects_xy(self.polygon, x, y))
 

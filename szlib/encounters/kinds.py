@@ -155,9 +155,8 @@ def classify_motion(
     turn = np.nan_to_num(rows.velocity[both[0]].conj() * rows.velocity[both[1]])
     along, across = (np.bincount(pair, part, n) for part in (turn.real, turn.imag))
     angle = np.abs(np.arctan2(across, along))
-    rules = [stands, angle <= ALONG, angle >= np.pi - ALONG]
     # standing, same direction, opposite, else crossing
-    return np.select(rules, [1, 2, 3], 4)
+    return np.select([stands, angle <= ALONG, angle >= np.pi - ALONG], [1, 2, 3], 4)
 
 
 def _common_track(pairs: np.ndarray, rows: TrackRows) -> tuple[np.ndarray, np.ndarray]:

@@ -95,8 +95,8 @@ def _draw(
 ) -> np.ndarray:
     """Draw shifts [s] of `minutes` (shortest, longest) either way, in recordings of so many `seconds`."""
     low, high = (60 * float(each) for each in minutes)
-    expected = "(shortest, longest), both positive"
-    require(0 < low <= high < np.inf, "minutes", minutes, expected)
+    is_range = 0 < low <= high < np.inf
+    require(is_range, "minutes", minutes, "(shortest, longest), both positive")
     share = np.minimum(seconds / (low + high), 1)
     if low * share.min() < SHORTEST:
         raise DataError(

@@ -188,9 +188,10 @@ class Crowd:
         """Number of the stream of each person; each day has its own."""
         rows = self.rows
         unit = self.unit[self.rows.person]
-        along = rows.velocity.real
-        across = rows.velocity.imag
-        heading = np.arctan2(np.bincount(unit, across), np.bincount(unit, along))
+        # the sum of each unit's velocities
+        heading = np.arctan2(
+            np.bincount(unit, rows.velocity.imag), np.bincount(unit, rows.velocity.real)
+        )
         width = 2 * np.pi / SECTORS
         from_border = np.abs(((heading[:, None] - _OFFSETS) / width + 0.5) % 1 - 0.5)
         offset = _OFFSETS[np.argmin((from_border < 0.15).sum(axis=0))]

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import beta, gamma, quantile_test
+from scipy.stats import beta, quantile_test
 
 from .occupants import TrackRows, find_neighbours
 
@@ -36,8 +36,10 @@ AHEAD = 2.0
 """Time for which two people are taken to walk on [s] (assumed)."""
 _FARTHEST = 2.0  # approaches up to this are looked at [m]
 _REACH = 6.0  # of people who may come so near within `AHEAD` [m]
-# A sound tracker ends at most so many times as many tracks at a distance as beyond.
+# A sound tracker ends at most so many times as many tracks at a distance as beyond, and this share of those
+# that go on beyond. (Beyond 2 m tracks end at 1 % of the samples at the ATC mall, 5 % at Grand Central.)
 _MOST = 2.0
+_MOST_LOST = 0.05
 _FEWEST = 5  # ends that say something
 _SMALL = 0.005  # level at which a distance counts as not resolved
 _MOST_LAG = 20  # steps of the clock between two samples of the slowest sensor
@@ -64,7 +66,7 @@ class SensorCheck:
     ends_near, ends_low, ends_high : share of the ends at which a stranger would come within 0.6 m (see the
         top of this module), and its interval.
     samples_near : the same share of all samples.
-    resolved : distance beyond which no more tracks end than elsewhere [m]; 0: at every distance.
+    resolved : distance beyond which no more tracks end than elsewhere, at least 0.6 m; 0: at every distance.
     noise, noise_low, noise_high : standard error of a position [m], the median over people, and its interval;
         0: none was found.
     passes, exchanged : number of pairs of strangers who pass within 0.6 m, and of those whose ids look
@@ -98,7 +100,10 @@ class SensorCheck:
     def __str__(self) -> str:
         ends = "no track ends inside the area"
         noise = "no error of positions was found"
-        passes = f"no two people pass within {NEAR_END:g} m"
+        passes = (
+            f"no two people pass within {NEAR_END:g} m: make sure that nothing removed people near "
+            "others, or pushed them apart"
+        )
         if self.ends:
             ends = (
                 f"{self.ends_near:.1%} ({self.ends_low:.1%} to {self.ends_high:.1%}) of {self.ends:,} ends "
@@ -106,9 +111,10 @@ class SensorCheck:
                 "of all samples"
             )
         if self.noise:
-            low = 100 * self.noise_low
-            high = 100 * self.noise_high
-            noise = f"a position errs by {100 * self.noise:.1f} cm ({low:.1f} to {high:.1f})"
+            noise = (
+                f"a position errs by {100 * self.noise:.1f} cm ({100 * self.noise_low:.1f} to "
+                f"{100 * self.noise_high:.1f})"
+            )
         if self.passes:
             low, high = _interval_of_share(self.exchanged, self.passes)
             passes = (
@@ -150,8 +156,9 @@ def count_ends(
     resolved = _find_excess(ends, samples, _FARTHEST)
     if resolved:
         lost = inside & (approach < resolved)
-        vanish = _find_excess(distance[lost & is_end], distance[lost], _REACH)
-        resolved = max(resolved, vanish)
+        resolved = max(
+            resolved, _find_excess(distance[lost & is_end], distance[lost], _REACH)
+        )
     low, high = _interval_of_share(int((ends < NEAR_END).sum()), len(ends))
     return {
         "ends": len(ends),
@@ -169,10 +176,11 @@ def _find_excess(ends: np.ndarray, samples: np.ndarray, farthest: float) -> floa
 
     Both are distances [m], of which those up to the `farthest` are looked at.
     """
-    edges = np.r_[0.0, np.arange(0.2, farthest + 0.05, 0.1)]
+    edges = np.r_[0.0, np.arange(NEAR_END, farthest + 0.05, 0.1)]
     near, common = (np.histogram(each, edges)[0] for each in (ends, samples))
     beyond = (len(ends) - near.cumsum() + 1) / (len(samples) - common.cumsum() + 1)
-    is_more = gamma.ppf(_SMALL, near) > _MOST * beyond * common
+    most = np.minimum(_MOST * beyond, beyond + _MOST_LOST * (1 - beyond))
+    is_more = beta.ppf(_SMALL, near, common - near + 1) > most
     return float(edges[1:][is_more & (near >= _FEWEST)].max(initial=0.0))
 
 

@@ -119,8 +119,8 @@ class Ellipse:
         position : (x, y) of the person [m].
         heading : direction in which the person faces, counter-clockwise from x [rad].
         """
-        center = np.asarray(position, float) + self.center @ _axes(heading)
-        return Ellipse(tuple(center), self.semi_axes, self.angle + heading)
+        moved = np.add(position, self.center @ _axes(heading))
+        return Ellipse(tuple(moved), self.semi_axes, self.angle + heading)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +172,9 @@ class EllipseZone:
         weights = (1 - share, share)
         center = np.average([e.center for e in ends], axis=0, weights=weights)
         roots = [_axes(e.angle).T * e.semi_axes for e in ends]
-        matrix = np.average([r @ r.T for r in roots], axis=0, weights=weights)
-        squares, axes = np.linalg.eigh(matrix)
+        squares, axes = np.linalg.eigh(
+            np.average([r @ r.T for r in roots], axis=0, weights=weights)
+        )
         b, a = np.sqrt(squares)
         return Ellipse(tuple(center), (a, b), np.arctan2(axes[1, 1], axes[0, 1]))
 
@@ -187,8 +188,9 @@ class EllipseZone:
 def find_neighbours(speeds: Iterable[float], speed: float) -> list[float]:
     """The `speeds` next to a `speed`, below and above; one if it is among them, or outside of them."""
     known = sorted(speeds)
-    below = [v for v in known if v <= speed]
-    return sorted({*below[-1:], *[v for v in known if v >= speed][:1]})
+    return sorted(
+        {*[v for v in known if v <= speed][-1:], *[v for v in known if v >= speed][:1]}
+    )
 
 
 def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:

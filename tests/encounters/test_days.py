@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import joblib
+import numpy as np
 import pandas as pd
 import psutil
 import pytest
@@ -127,6 +128,33 @@ def test_finished_days_are_kept_and_changed_days_computed_again(days, tmp_path):
     assert statuses() == ["done"] * 4
     record = json.loads((out / f"{DATES[0]}.parquet.json").read_text())
     assert record["made_of"]["parameters"]["min_speed"] == 0.4
+
+
+def test_a_day_that_fails_leaves_no_earlier_result(days, tmp_path):
+    copies = [tmp_path / day.name for day in days[:2]]
+    for copy, day in zip(copies, days, strict=False):
+        copy.write_bytes(day.read_bytes())
+    extract(copies, tmp_path / "out")
+    lines = copies[1].read_text().splitlines()
+    lines[1::3] = ["x,y,z,,,,,"] * len(lines[1::3])
+    copies[1].write_text("\n".join(lines))
+    assert list(extract(copies, tmp_path / "out").table["status"]) == ["kept", "failed"]
+    assert list(szlib.Extraction.load(tmp_path / "out").sources) == [DATES[0]]
+
+
+def test_links_keep_their_names_and_the_recipe_beside_them(tmp_path):
+    walk = pd.DataFrame({"t": np.arange(9.0), "id": 1, "x": np.arange(9.0), "y": 0.0})
+    (tmp_path / "store").mkdir()
+    walk.assign(x=100 * walk["x"]).to_csv(tmp_path / "store" / "8f3a", index=False)
+    folder = tmp_path / "data"
+    folder.mkdir()
+    (folder / "hall.csv").symlink_to(tmp_path / "store" / "8f3a")
+    szlib.Recipe(unit="cm", max_gap=2.0).save(folder / "reading.json")
+    for number, paths in enumerate((folder / "hall.csv", folder)):
+        with pytest.warns(szlib.DataWarning, match="reading.json are used"):
+            found = extract(paths, tmp_path / f"out{number}", area="-1 9 -3 3")
+        assert list(found.table["day"]) == ["hall"]
+        assert found.recipe.unit == "cm" and found.recipe.max_gap == 2.0
 
 
 def test_files_of_finished_days_are_not_read_again(days, tmp_path, monkeypatch):

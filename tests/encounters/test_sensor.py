@@ -65,6 +65,18 @@ def test_tracks_that_break_anywhere_are_no_lost_people():
         assert broken.ends > 100 and not broken.loses_people, str(broken)
 
 
+def test_lost_people_are_noticed_where_tracks_break_everywhere():
+    """Then tracks end beside others less than twice as often as elsewhere."""
+    for seed, every in enumerate((0.8, 1.2, 1.6, 2.5, 4.0)):
+        rng = np.random.default_rng(seed)
+        rows = crowds.as_table(crowds.singles(rng, 1400, 1800))
+        broken = crowds.broken(rows, rng, every)
+        sound = check(crowds.read(broken, rng))
+        assert not sound.loses_people, f"every {every} s: {sound}"
+        lost = check(crowds.read(crowds.merging(broken, rng, 0.7), rng))
+        assert lost.loses_people, f"every {every} s: {lost}"
+
+
 def test_the_description_says_how_many_pairs_and_what_is_lost():
     sound = describe_pairs(crowd_of(2), crowds.AREA).splitlines()
     assert sound[0].startswith(

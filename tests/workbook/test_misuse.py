@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pandas as pd
+import psutil
 import pytest
 from helpers.faulty_disk import FaultyDisk
 
@@ -133,6 +134,31 @@ def test_cache_is_not_used_for_other_data_of_the_same_name_and_size(
     with pytest.warns(szlib.DataWarning):
         assert len(later.cache.encounters()) > 0, "what is damaged is healed"
     assert len(pd.read_parquet(artefact)) > 0
+
+
+def test_report_describes_the_encounters_of_its_own_data(
+    notebooks, without_kernels, tmp_path
+):
+    notebooks(_01_one="", _02_two="record.cache.encounters()")
+    file = make_plaza(tmp_path / "a.csv", settings=PlazaSettings(n_encounters=30))
+
+    def run_only(*names):
+        return runner.run(str(file), out=tmp_path / "out", only=names)
+
+    def read_stages():
+        return json.loads((tmp_path / "out" / "a" / "summary.json").read_text())
+
+    run_only("02")
+    rows = len(file.read_text().splitlines())
+    assert read_stages()["stages"][0]["rows"] == rows
+    file.write_text("".join(file.read_text().splitlines(keepends=True)[:3000]))
+    run_only("01")
+    assert "stages" not in read_stages(), "the encounters are those of other data"
+    run_only("02")
+    assert read_stages()["stages"][0]["rows"] == 3000
+    (tmp_path / "out" / "a" / "encounters.parquet").write_bytes(b"PAR1")
+    run_only("01")
+    assert "stages" not in read_stages(), "they are damaged"
 
 
 def test_foreign_file_with_the_name_of_the_plaza_is_replaced(tmp_path, monkeypatch):
@@ -350,7 +376,8 @@ def test_sigterm_stops_extract_with_exit_code_143(tmp_path):
 
 
 @pytest.mark.slow
-def test_sigterm_stops_a_run_and_its_kernels(notebooks, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_signal_stops_a_run_and_its_processes(notebooks, tmp_path, number):
     sleeper = """
 import os, time
 record.table(__import__("pandas").DataFrame({"pid": [os.getpid()]}), "kernel")
@@ -370,15 +397,16 @@ time.sleep(120)"""
     while not table.exists() and run.poll() is None:
         time.sleep(0.05)
     kernel = int(table.read_text().split()[1])
-    run.send_signal(signal.SIGTERM)
+    processes = psutil.Process(run.pid).children(recursive=True)
+    assert kernel in {process.pid for process in processes}
+    run.send_signal(number)
     _, printed = run.communicate()
-    assert run.returncode == 143
-    assert "szlib: stopped; finished results stay" in printed
-    end = time.monotonic() + 30
-    while Path(f"/proc/{kernel}").exists() and time.monotonic() < end:
-        time.sleep(0.1)
-    assert not Path(f"/proc/{kernel}").exists()
-    assert not list(tmp_path.glob("*.json")), "the kernel's connection file"
+    _, alive = psutil.wait_procs(processes, timeout=30)
+    assert not [each for each in alive if each.status() != psutil.STATUS_ZOMBIE]
+    if number == signal.SIGTERM:
+        assert run.returncode == 143
+        assert "szlib: stopped; finished results stay" in printed
+        assert not list(tmp_path.glob("*.json")), "the kernel's connection file"
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert not left["passed"]
     assert not list(tmp_path.rglob("*.ipynb")), "an unfinished copy"

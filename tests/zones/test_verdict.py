@@ -124,6 +124,14 @@ def test_careless_share_above_q_is_noticed():
     assert any("careless people" in reason for reason in zone.verdict(SPEED).reasons)
 
 
+def test_a_radius_that_may_be_that_of_bodies_is_noticed(careful):
+    test = careful.null_test
+    wide = replace(test.respect, low=0.0)
+    verdict = replace(careful, null_test=replace(test, respect=wide)).verdict(SPEED)
+    assert verdict == "undecided"
+    assert any("two bodies that touch" in reason for reason in verdict.reasons)
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [

@@ -242,10 +242,12 @@ def id_switches(
     return rows.assign(id=ids)
 
 
-def broken(rows: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    """A tracker that loses a person for half a second every 4 s or so."""
+def broken(
+    rows: pd.DataFrame, rng: np.random.Generator, every: float = 4.0
+) -> pd.DataFrame:
+    """A tracker that loses a person for half a second, `every` so many seconds or so."""
     rows = rows.sort_values(["id", "tick"], ignore_index=True)
-    starts = rng.random(len(rows)) < _DT / 4
+    starts = rng.random(len(rows)) < _DT / every
     gone = np.convolve(starts, np.ones(6), "full")[: len(rows)] > 0
     return _new_ids(rows.assign(gone=gone))
 
