@@ -442,7 +442,9 @@ Markdown(
 # ahead of you. So the longer front of your zone hides the back of mine. Then the centre and the semi-axis a are wrong by several
 # centimetres in opposite directions, and their sum, the reach ahead, is nearly right. The interval from the data alone was too narrow
 # for people who differ from the model, and for noise. So it carries an error of the model as well, measured on crowds that walk
-# by other rules and on noisy plazas: a standard deviation of at least 3 cm along the motion, and 1.8 cm across.
+# by other rules and on noisy plazas: a standard deviation of at least 3 cm along the motion, and 1.8 cm across. The people of
+# these crowds step aside by 5 cm more than they must. If they step aside by 0.5 m more, the zone is 12 to 28 % too short along
+# the motion, and its interval misses the true one (`szlib.zones.verdict` has what no verdict can tell).
 #
 # **A common mistake:** "the 95 % interval contains the true zone with 95 %". No: it does so only if the method aims at
 # the true zone. The quantile zone aims at a quantile, not at the true edge.

@@ -103,7 +103,7 @@ def copy_notebooks(folder: str | Path) -> Path:
             _pair_notebooks(place)
     except OSError as error:
         raise StorageError(
-            f"{printable(place)}: cannot be made ({error.strerror or str(error)[:200]}); choose another folder"
+            f"{printable(place)}: cannot be made ({error.strerror or str(error)[:99]}); choose another folder"
         ) from error
     return place
 
