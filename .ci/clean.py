@@ -24,7 +24,7 @@ OF_RUN = (
     *CACHED, *(f"{name}.json" for name in CACHED),
 )  # fmt: skip
 # What `make slides` writes.
-OF_SLIDES = (f"{NOTEBOOK}.html", f"figures/{NOTEBOOK}.png")
+OF_SLIDES = (f"{NOTEBOOK}.html", f"{NOTEBOOK}.pdf", f"figures/{NOTEBOOK}.png")
 
 
 def clean(results: Path) -> None:

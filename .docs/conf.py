@@ -16,7 +16,7 @@ from pathlib import Path
 
 import nbformat
 import yaml
-from docutils.nodes import SkipNode
+from docutils import nodes
 from latex2mathml.converter import convert
 
 import szlib
@@ -65,6 +65,13 @@ napoleon_use_param = False
 napoleon_use_rtype = False
 napoleon_use_ivar = True
 suppress_warnings = ["myst.xref_missing", "myst.header", "mystnb.unknown_mime_type"]
+# The anchor of a link to a heading of a notebook.
+ANCHOR = re.compile(r"(?<=\.ipynb)#(?:[^()\s]|\([^()\s]*\))+(?=\))")
+# Links of a page that has another place in the site.
+MOVED = {
+    "README.md": {"](.github/CONTRIBUTING.md": "](CONTRIBUTING.md"},
+    "CONTRIBUTING.md": {"](../README.md": "](index.md", "](../": "]("},
+}
 
 
 def copy_pages(*_):
@@ -80,6 +87,11 @@ def copy_pages(*_):
         (PAGES / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / f"{name}.md", PAGES / f"{name}.md")
     shutil.copy(ROOT / ".github" / "CONTRIBUTING.md", PAGES)
+    for name, links in MOVED.items():
+        text = (PAGES / name).read_text(encoding="utf-8")
+        for before, after in links.items():
+            text = text.replace(before, after)
+        (PAGES / name).write_text(text, encoding="utf-8")
     (PAGES / "cite.md").write_text(
         f"# Cite\n\n```bibtex\n{make_bibtex()}```\n", encoding="utf-8"
     )
@@ -121,9 +133,22 @@ def claim_site(app, _):
         claim_folder(app.outdir, "site of the docs")
 
 
-def remove_copies(app, _):
-    """Remove the pictures that myst-nb leaves beside the site, which has its own."""
-    shutil.rmtree(Path(app.outdir).parent / "jupyter_execute", ignore_errors=True)
+def show_text(app, doctree, name):
+    """Show a link to a file that is no page of the site as its text."""
+    elements = doctree.findall(nodes.Element)
+    anchors = {each for element in elements for each in element["ids"]}
+    for link in list(doctree.findall(nodes.reference)):
+        target = link.get("refuri") or f"#{link.get('refid')}"
+        if target[0] == "#" and target[1:] not in anchors:
+            link.replace_self(link.children)
+
+
+def finish_site(app, _):
+    """Remove the pictures that myst-nb leaves beside the site, and copy those that pages show by HTML."""
+    site = Path(app.outdir)
+    shutil.rmtree(site.parent / "jupyter_execute", ignore_errors=True)
+    figures = site / "notebooks" / "figures"
+    shutil.copytree(NOTEBOOKS / "figures", figures, dirs_exist_ok=True)
 
 
 def find_pages(pattern):
@@ -138,6 +163,11 @@ def copy_notebook(source, target):
     """Copy an executed notebook; the alternative text of its pictures goes where myst-nb looks for it."""
     notebook = nbformat.read(source, as_version=4)
     for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            # JupyterLab and MyST make anchors of headings each in their own way
+            cell.source = ANCHOR.sub(
+                lambda link: re.sub(r"[^\w#-]", "", link[0].lower()), cell.source
+            )
         for output in cell.get("outputs", ()):
             if alt := output.get("metadata", {}).get("image/png", {}).get("alt"):
                 cell.metadata["mystnb"] = {"image": {"alt": alt}}
@@ -228,7 +258,7 @@ def draw_formula(translator, node):
     translator.body.append(
         convert(re.sub(r"\\(tag|label)\{.*?\}", "", node.astext()), display=display)
     )
-    raise SkipNode
+    raise nodes.SkipNode
 
 
 def setup(app):
@@ -236,5 +266,6 @@ def setup(app):
     app.add_html_math_renderer("mathml", (draw_formula, None), (draw_formula, None))
     app.connect("config-inited", claim_site)
     app.connect("config-inited", copy_pages)
-    app.connect("build-finished", remove_copies)
+    app.connect("build-finished", finish_site)
+    app.connect("doctree-resolved", show_text)
     app.connect("autodoc-process-docstring", adapt_docstring, priority=400)

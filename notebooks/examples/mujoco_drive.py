@@ -77,4 +77,6 @@ def run(tracks: str, walls: np.ndarray | None = None, seconds: float = 60.0, see
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
     print(run(sys.argv[1], szlib.walls_from_map(sys.argv[2]) if len(sys.argv) > 2 else None))

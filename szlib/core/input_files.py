@@ -13,7 +13,6 @@ import re
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
-from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,12 +20,9 @@ import psutil
 
 from .errors import DataError, MemoryLimitError, SzlibError
 
-# what differs after a file has changed
-_STATE = attrgetter("st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
-
+_LARGEST = 10_000_000  # of a small file [bytes]
 # Environment variable: the limit of each process, such as 4GB; ``--memory`` of the command line sets it.
 MEMORY_VARIABLE = "SZLIB_MEMORY"
-_SHARE = 0.8  # share of the available memory that may be used
 
 
 def require(
@@ -58,7 +54,7 @@ def explain_errors(
     what: str,
     advice: str,
     error: type[SzlibError] = DataError,
-    faults: type[BaseException] | tuple[type[BaseException], ...] = Exception,
+    faults: Any = Exception,
 ) -> Iterator[None]:
     """Replace errors of the classes `faults` in a with block by an `error` that says more.
 
@@ -97,12 +93,12 @@ def open_regular(path: Path) -> BinaryIO:
     return path.open("rb")
 
 
-def read_small(path: Path, largest: int = 10_000_000) -> bytes:
-    """The content of the regular file `path`; OSError where it has more than `largest` bytes."""
+def read_small(path: Path) -> bytes:
+    """The content of the regular file `path`; OSError where it has more than `_LARGEST` bytes."""
     with open_regular(path) as stream:
-        content = stream.read(largest + 1)
-    if len(content) > largest:
-        raise OSError(f"it is larger than {largest / 1e6:g} MB")
+        content = stream.read(_LARGEST + 1)
+    if len(content) > _LARGEST:
+        raise OSError(f"it is larger than {_LARGEST / 1e6:g} MB")
     return content
 
 
@@ -121,7 +117,8 @@ def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
 def file_state(path: Path) -> Any:
     """Inode, size and times of the file `path`."""
     with opening(path):
-        return _STATE(path.stat())
+        found = path.stat()
+    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 def opening(path: Path) -> AbstractContextManager[None]:
@@ -175,7 +172,7 @@ def memory_limit() -> int:
     available = psutil.virtual_memory().available
     with suppress(OSError, ValueError):  # "max": no limit
         available = min(available, int(Path("/sys/fs/cgroup/memory.max").read_text()))
-    return int(_SHARE * available)
+    return int(0.8 * available)
 
 
 @contextmanager

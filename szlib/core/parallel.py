@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import Any
 
 import joblib
@@ -28,8 +27,6 @@ from .input_files import (
 )
 
 _MAX_PER_CORE = 4  # more processes than this for each core slow each other down
-# Start processes inside a with block that import nothing from the current folder.
-safe_path = partial(environment, PYTHONSAFEPATH="1")
 
 
 def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
@@ -49,12 +46,14 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
     """
     n_jobs = limit_jobs(n_jobs, len(tasks))
     jobs = None if n_jobs == 1 else n_jobs
-    share = memory_limit() // max(1, joblib.effective_n_jobs(jobs))
     workers = joblib.Parallel(
         n_jobs=jobs,
         return_as="generator_unordered",
         initializer=_begin_process,
-        initargs=(os.getpid(), share),
+        initargs=(
+            os.getpid(),
+            memory_limit() // max(1, joblib.effective_n_jobs(jobs)),
+        ),
     )
     with explain_errors(
         "a worker process was killed, perhaps for lack of memory",
@@ -62,7 +61,8 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
         SzlibError,
         TerminatedWorkerError,
     ):
-        with safe_path():
+        # no process imports from the current folder
+        with environment(PYTHONSAFEPATH="1"):
             results = workers(tasks)
         yield from results
 

@@ -26,7 +26,7 @@ import pandas as pd
 from tqdm import tqdm
 
 from .. import __version__
-from ..core.errors import DataError, DataWarning, SzlibError
+from ..core.errors import DataError, DataWarning, SzlibError, warn
 from ..core.files import claim_folder, folder_purpose, load_cached, store_cached
 from ..core.input_files import (
     file_content,
@@ -219,8 +219,14 @@ class Extraction:
                 f"{folder}: no day is left; expected one besides those excluded, {sorted(excluded)}, and "
                 "those that failed: `szlib extract` says why"
             )
-        table = pd.DataFrame({"day": list(sources), "status": "kept"})
-        return cls(folder, table, settings, recipe, sources, excluded)
+        return cls(
+            folder,
+            pd.DataFrame({"day": list(sources), "status": "kept"}),
+            settings,
+            recipe,
+            sources,
+            excluded,
+        )
 
     @property
     def failed(self) -> pd.DataFrame:
@@ -296,7 +302,8 @@ def extract_days(
         same for all days of a calendar; recordings without a calendar have each their own.
     recipe : how files are read.
     n_jobs : number of processes; -1 takes all cores, or all workers of ``joblib.parallel_config("dask")``.
-    exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
+    exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.  A
+        DataWarning names those that are no day of the files.
     progress : whether to show a bar over the days.
     parameters : single values in place of those of `settings` and `recipe`, such as area or unit.
 
@@ -317,8 +324,11 @@ def extract_days(
     >>> days.samples()["encounter"].nunique() > 0
     True
     """
-    names = {each.name for each in fields(Recipe)} - {"area"}
-    of_recipe = {name: parameters.pop(name) for name in names & parameters.keys()}
+    of_recipe = {
+        each.name: parameters.pop(each.name)
+        for each in fields(Recipe)
+        if each.name in parameters and each.name != "area"
+    }
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     excluded = {exclude} if isinstance(exclude, str) else set(map(str, exclude))
     files = sorted({file.absolute() for file in datasets.find(paths)})
@@ -329,14 +339,17 @@ def extract_days(
         [state] = find_states([file])
         day = find_day(file, recipe) or printable(name)
         days.setdefault(day, {})[file] = state
+    for day in excluded - days.keys():
+        warn(f"{day} is excluded, but there is no such day: there are {sorted(days)}")
     included = {day: days[day] for day in sorted(days.keys() - excluded)}
     shared = [day for day in included if has_calendar(day) or len(included) == 1]
     common = settings
     for day in shared:
         # the first day with an area; computing a day that fails says why
         with suppress(SzlibError):
-            area = find_area([*included[day]], settings, recipe)
-            common = replace(settings, area=area)
+            common = replace(
+                settings, area=find_area([*included[day]], settings, recipe)
+            )
             break
     tasks = [
         joblib.delayed(extract_day)(
@@ -348,9 +361,15 @@ def extract_days(
         )
         for day in included
     ]
-    found = run_tasks(tasks, n_jobs=n_jobs)
     # With disable=None the bar is shown in a terminal.
-    rows = list(tqdm(found, total=len(tasks), unit="day", disable=not progress or None))
+    rows = list(
+        tqdm(
+            run_tasks(tasks, n_jobs=n_jobs),
+            total=len(tasks),
+            unit="day",
+            disable=not progress or None,
+        )
+    )
     for day in days.keys() & excluded:
         rows.append(_ROW | {"day": day, "files": len(days[day])})
     table = pd.DataFrame(rows, columns=list(_ROW)).sort_values("day", ignore_index=True)
@@ -385,8 +404,7 @@ def extract_day(
             stored = load_source(out, day)
             if stored:
                 source = describe_source(files, settings, recipe, stored)
-                before = {"states": stored.get("states")}
-                samples = load_day(out, day, source | before)
+                samples = load_day(out, day, source | {"states": stored.get("states")})
             status = "kept"
             if samples is None:
                 status = "done"
@@ -397,8 +415,10 @@ def extract_day(
                     described = thread.submit(
                         describe_source, files, settings, recipe, source
                     )
-                    rows = merge_files(loaded, select=partial(select_near, settings))
-                    tracks = interpolate(rows, recipe.max_gap)
+                    near = partial(select_near, settings)
+                    tracks = interpolate(
+                        merge_files(loaded, select=near), recipe.max_gap
+                    )
                     samples = find_encounters(tracks, settings=settings)
                 source = described.result()
         if status == "done" or source != stored:

@@ -17,8 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import pooch
-
 from ..core.errors import DataError
 from ..core.input_files import explain_errors, printable
 from .recipe import FILE_NAME
@@ -108,6 +106,8 @@ def label(data: str | Path | Sequence[str | Path]) -> str:
 
 def _find_named(name: str | Path) -> list[Path]:
     """The files of a named data set, each with the right hash."""
+    import pooch  # a robot, and files of one's own, need none
+
     data = DATA_SETS[str(name)]
     folder = os.environ.get(DATA_DIR_VARIABLE)
     store = pooch.create(
@@ -135,7 +135,9 @@ def _expand(name: str | Path) -> list[Path]:
             found = [file for file in path.glob("[!.]*") if file.name != FILE_NAME]
     files = sorted(filter(Path.is_file, found))
     if not files:
+        what = "no such file"
         raise DataError(
-            f"{shown}: {'is no regular file' if found else 'no such file'}; {expected}"
+            f"{shown}: {'holds no file' if path.is_dir() else 'is no regular file' if found else what}; "
+            f"{expected}"
         )
     return files

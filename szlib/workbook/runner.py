@@ -29,8 +29,13 @@ from tqdm import tqdm
 
 from ..core.errors import DataError, StorageError
 from ..core.files import load_cached, write_file
-from ..core.input_files import MEMORY_VARIABLE, explain_errors, memory_limit
-from ..core.parallel import limit_jobs, safe_path
+from ..core.input_files import (
+    MEMORY_VARIABLE,
+    environment,
+    explain_errors,
+    memory_limit,
+)
+from ..core.parallel import limit_jobs
 from ..tracks import datasets, funnels
 from . import folders
 from .execution import EMPTY_RECORD, execute_notebook
@@ -90,7 +95,7 @@ def run(
     root = folders.default_results(place) if out is None else folders.results_root(out)
     data = folders.absolute_data(data)
     home = folders.claim_results(root, data, given)
-    with _folder_lock(home), safe_path():
+    with _folder_lock(home), environment(PYTHONSAFEPATH="1"):
         made_of = _find_source(home, data, given)
         source = {name: made_of[name] for name in ("szlib", "data", "files")}
         source["parameters"] = given
@@ -122,10 +127,13 @@ def _folder_lock(folder: Path) -> Iterator[None]:
     Raises StorageError where another process has reserved it, or where this one may not write.
     """
     lock = FileLock(folder / ".szlib-lock-run", timeout=0)
-    failed = f"{folder}: cannot be written, or another process is writing there"
-    advice = "wait until it ends, or choose another folder"
     with ExitStack() as stack:
-        with explain_errors(failed, advice, StorageError, OSError):
+        with explain_errors(
+            f"{folder}: cannot be written, or another process is writing there",
+            "wait until it ends, or choose another folder",
+            StorageError,
+            OSError,
+        ):
             stack.enter_context(lock)
         yield
 
@@ -204,7 +212,7 @@ def _execute_all(
     """Execute the notebooks; yield the name and the outcome of each when it has ended."""
     jobs = max(limit_jobs(jobs, len(scripts)), 1)
     threads = str(max(1, (os.cpu_count() or 1) // jobs))
-    environment = {
+    variables = {
         folders.RUN_VARIABLE: str(home),
         folders.FIGURES_VARIABLE: figures or "",
         MEMORY_VARIABLE: str(memory_limit() // jobs),
@@ -215,11 +223,11 @@ def _execute_all(
     workers = Parallel(max(jobs, 2), pre_dispatch=jobs, batch_size=1, **options)
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
     with bar, TemporaryDirectory(prefix="szlib-") as private:
-        environment |= {"TMPDIR": private, "IPYTHONDIR": private}
+        variables |= {"TMPDIR": private, "IPYTHONDIR": private}
 
         def execute(script: Path) -> tuple[str, dict[str, Any]]:
             """The name of a notebook and its outcome."""
-            return script.stem, execute_notebook(script, given, home, environment)
+            return script.stem, execute_notebook(script, given, home, variables)
 
         try:
             for batch in split_batches(scripts):

@@ -138,12 +138,14 @@ NO_SMALL_FILES: dict[str, Callable[[Path], object]] = {
         ("area.json", szlib.as_area),
         ("zone.json", szlib.SocialZone.load),
         ("reading.json", szlib.Recipe.load),
-        ("run.json", SimulationLog.load),
+        ("run.npz", SimulationLog.load),
     ],
 )
 def test_what_is_no_small_regular_file_is_refused(
     name: str, read: Callable[[Path], object], reason: str, tmp_path: Path
 ) -> None:
+    if name == "run.npz" and "larger" in reason:
+        pytest.skip("a run may be large")
     NO_SMALL_FILES[reason](tmp_path / name)
     with pytest.raises(szlib.SzlibError, match=reason) as refused:
         read(tmp_path / name)

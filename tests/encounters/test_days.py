@@ -142,6 +142,14 @@ def test_a_day_that_fails_leaves_no_earlier_result(days, tmp_path):
     assert list(szlib.Extraction.load(tmp_path / "out").sources) == [DATES[0]]
 
 
+def test_an_excluded_day_that_does_not_exist_is_named(days, tmp_path):
+    with pytest.warns(
+        szlib.DataWarning, match="hall is excluded, but there is no such"
+    ):
+        found = extract(days[:1], tmp_path, exclude=["hall"])
+    assert list(found.table["status"]) == ["done"]
+
+
 def test_links_keep_their_names_and_the_recipe_beside_them(tmp_path):
     walk = pd.DataFrame({"t": np.arange(9.0), "id": 1, "x": np.arange(9.0), "y": 0.0})
     (tmp_path / "store").mkdir()
