@@ -397,3 +397,16 @@ def test_ready_made_environments_name_what_exists():
     (run,) = [command for command in commands if "szlib" in command]
     options = build_parser().parse_args(run.split()[1:])
     assert (options.area, Path(options.out)) == ("auto", Path("../results").resolve())
+
+
+def test_the_error_of_a_missing_package_names_the_extra():
+    program = (
+        "import sys; sys.modules['polars'] = None\n"
+        "import szlib\n"
+        "try:\n    szlib.SocialZone\n"
+        "except ModuleNotFoundError as error:\n    print(error)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "szlib.SocialZone needs polars: pip install 'szlib[data]'\n"
