@@ -77,6 +77,4 @@ def run(tracks: str, walls: np.ndarray | None = None, seconds: float = 60.0, see
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    print(run(sys.argv[1], szlib.walls_from_map(sys.argv[2]) if len(sys.argv) > 2 else None))
+    print(run(sys.argv[1], *map(szlib.walls_from_map, sys.argv[2:]))) if sys.argv[1:] else sys.exit(__doc__)

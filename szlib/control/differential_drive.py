@@ -204,15 +204,18 @@ class DriveStep(Step):
 class DifferentialDrive(MPCCBF):
     """Drives a robot with two wheels to a goal, outside the social zones of people and away from walls.
 
-    The disc's centre comes to within 7 cm of a goal, at any heading, if the goal is r_robot + 2 `ahead` and
-    some cm from walls and zones of people who stand. At a closer goal the robot turns its back to the
-    obstacle and goes backwards; it needs about r_robot + `ahead` there, else it moves about near the goal.
+    The disc's centre comes to within 7 cm of a goal, at any heading, if v_max is 1.5 m/s or less, and the
+    goal is r_robot + 2 `ahead` and some cm from walls and zones of people who stand. At a closer goal the
+    robot turns its back to the obstacle and goes backwards; it needs about r_robot + `ahead` there, else it
+    moves about near the goal. A robot that starts in front of a wall nearer than `ahead`, where its point is
+    in or beyond the wall, may stay there: turn it first.
 
     The `state` that `step` takes is (x, y, theta) of the axle's middle [m, rad], or (x, y, theta, v, omega)
     [m, rad, m/s, rad/s]. The plan begins at the planned velocity of the point. If the robot was stopped or
     pushed, and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega), but
-    no faster than the wheels. The `goal` is that of the disc's centre. The step is a `DriveStep`, whose
-    `control` is (v, omega), to be held for the next dt.
+    no faster than the wheels. With a `state_age` above 0 this is not noticed: call `reset` after a stop. The
+    `goal` is that of the disc's centre. The step is a `DriveStep`, whose `control` is (v, omega), to be held
+    for the next dt.
 
     Parameters
     ----------

@@ -287,7 +287,8 @@ class Obstacle:
     def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
         """Boxes that hold all places nearer to obstacles than `offsets`: corners, shape (n, 2) each [m].
 
-        By default everywhere: then a map of ways measures each cell, and ends 8 m from robot and goal.
+        By default everywhere: then a map of ways measures each cell, and ends 8 m from robot and goal. It
+        takes each obstacle for solid, whatever its priority.
 
         Parameters
         ----------

@@ -65,7 +65,8 @@ class MPCSettings:
     lookahead : the plan heads for the point of the way that lies at most this far ahead [m]: see
         `szlib.control.ways`. `inf`, as in the paper: no way is looked for, and the plan heads for the goal.
         On a large map a new goal takes some 0.1 s, at most some 0.5 s; 1 s if r_robot + eps is nearly 0.
-        Towards a goal that is some 500 m away the map is coarse, and doors are closed: give a nearer one.
+        Towards a goal that is 150 m away or more the map is coarse, and doors may be closed: give a nearer
+        one.
     eps : margin [m], for instance for the error of the approximate distances; see `margin`.
     margin : around walls. "euclidean": eps, in Euclidean distance. By the paper's distance (eq. 3-5), which
         is greater beyond the ends: "paper": eps, which allows overlaps with the ends of walls shorter
@@ -249,6 +250,6 @@ class MPCSettings:
     @cached_property
     def times(self) -> Array:
         """Time of each state of the plan, from now, shape (N+1,), read-only [s]."""
-        times = np.asarray(self.dt * np.cumsum((0, *self.step_lengths)))
+        times = self.dt * np.cumsum((0, *self.step_lengths))
         times.flags.writeable = False
         return times

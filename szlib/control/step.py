@@ -19,7 +19,7 @@ from .settings import TOLERANCE, MPCSettings
 from .verification import Report, Row, Rows, Sampled, list_rows, verify_step
 from .ways import Way
 
-Status = Literal["optimal", "relaxed", "restarted", "braking"]
+Status = Literal["optimal", "relaxed", "restarted", "kept", "braking"]
 STATUSES: tuple[Status, ...] = get_args(Status)
 """How a control was found; see `Step.status`."""
 # A barrier condition whose residual is smaller than this holds the robot [m].
@@ -28,6 +28,7 @@ _MEANING: dict[Status, str] = {
     "optimal": "optimal, every row without a price holds",
     "relaxed": "relaxed by priorities: walls, bodies, zones, decay",
     "restarted": "relaxed by priorities, from full braking",
+    "kept": "the rest of the last plan, which is safe, as the new one is not",
     "braking": "full braking",
 }
 
@@ -103,8 +104,9 @@ class Step:
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     inputs : accelerations of the plan, shape (N, 2) [m/s2].
     status : "optimal": the plan satisfies every row without a price. "relaxed": it violates the least, by
-        priorities. "restarted": the same, found from full braking instead of from the last plan. "braking":
-        full braking, because it is safer than the plan, or there is none.
+        priorities. "restarted": the same, found from full braking instead of from the last plan. "kept": the
+        rest of the last plan, because it is passively safe, and the new one is not. "braking": full braking,
+        because it is safer than the plan, or there is none.
     walls_safe : True if the robot, which holds the control for dt and then brakes as hard as it can, touches
         nothing fixed. A robot that was walls_safe once stays so, whatever people do: see `szlib.control.mpc`.
     passively_safe : True if, besides, it overlaps no body while it moves, if people keep their velocity: if
@@ -204,7 +206,7 @@ class Step:
         s = self.asked.settings
         h = self._planned_h[:, : s.N_h + 1]
         keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h])
-        return np.asarray(h[:, 1:] - keep * h[:, :-1])
+        return h[:, 1:] - keep * h[:, :-1]
 
     @cached_property
     def _planned_h(self) -> Array:
@@ -251,7 +253,7 @@ class Step:
         A person slower than `people.STANDING_SPEED` counts as standing. The robot waits beside them; without
         a way it goes to the nearest point that it can reach.
         """
-        return self.asked.goal_blocked or self.way_length == inf
+        return self.scene.goal_blocked or self.way_length == inf
 
     @property
     def rejected(self) -> int:
@@ -365,8 +367,8 @@ class Step:
             "v_max": bool(scene.people) and not self.passively_safe,
             f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one": self.timed_out,
             f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
-            "helps: another goal": self.asked.goal_blocked,
-            "walls leave no way to the goal, so the robot goes to the nearest point that it can reach; what "
+            "helps: another goal": self.scene.goal_blocked,
+            "there is no way to the goal, so the robot goes to the nearest point that it can reach; what "
             "helps: another goal": self.way_length == inf,
             f"{self.rejected} measurements of people were rejected; {self.unknown} are "
             "unknown": self.rejected > 0,

@@ -175,7 +175,7 @@ class Map:
         self._low = low
         self._high = high
         size = high - low
-        side = min(CELL, max(SMALLEST_CELL, clearance / _MOST_SHARE))
+        side = min(CELL, max(SMALLEST_CELL, clearance / (_MOST_SHARE + slack)))
         # so that MOST_CELLS = (size[0] / cell + 2 _MARGIN) (size[1] / cell + 2 _MARGIN)
         most = MOST_CELLS - 4 * _MARGIN**2
         half = _MARGIN * size.sum() / most

@@ -135,7 +135,8 @@ class SimulationLog(Run):
     def save(self, path: str | Path) -> None:
         """Write the run to ``<path>.npz``: its arrays, and all else as a text of JSON, `content`.
 
-        `path` may have this suffix.  Claims are functions and are not saved.
+        `path` may have this suffix.  Claims are functions and are not saved, nor are ids, groups and
+        predictions of people.
 
         Raises
         ------

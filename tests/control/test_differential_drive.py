@@ -605,3 +605,14 @@ def test_explain_names_the_goal_that_was_given():
     step = drive.step((2.5, 0.0, 1.5), (3.0, 0.0), [szlib.Person((3.0, 0.5))])
     assert step.scene.goal == (3.0, 0.0) and step.goal_blocked
     assert "the goal (3.0, 0.0) cannot be reached" in step.explain()
+
+
+@pytest.mark.parametrize("heading", [-1.6, 0.0, 1.6])
+def test_a_goal_is_blocked_or_not_whatever_the_heading_is(heading: float) -> None:
+    """The disc fits at both goals; at the second one it would touch the wall."""
+    settings = szlib.MPCSettings(r_robot=0.3)
+    drive = szlib.DifferentialDrive(
+        ZONE, walls=[((-5.0, 0.6), (5.0, 0.6))], settings=settings
+    )
+    assert not drive.step((0.0, -3.0, heading), (0.0, 0.0)).goal_blocked
+    assert drive.step((0.0, -3.0, heading), (0.0, 0.4)).goal_blocked

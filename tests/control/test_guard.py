@@ -389,3 +389,58 @@ def test_a_post_is_seen_by_the_guard_though_the_paper_hardly_sees_it() -> None:
         assert step.walls_safe and step.verify().ok, step.verify().faults
         state = advance(state, step.control, 0.1)
     assert state[0] > 1.4, "it comes near the post"
+
+
+def test_a_safe_plan_is_kept_where_the_new_one_is_not_safe() -> None:
+    """A corridor of 3 m: one person comes from behind, another crosses; who brakes stops in front of them."""
+    walls = [((-20.0, y), (20.0, y)) for y in (1.5, -1.5)]
+    people = np.array([[-4.701, 0.65, 0.497, -0.05], [-1.234, -0.996, 0.956, 1.023]])
+    controller = szlib.MPCCBF(
+        szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), walls=walls, settings=SETTINGS["default"]
+    )
+    x, statuses = np.zeros(4), []
+    for _ in range(40):
+        step = controller.step(x, (6.0, 0.0), people)
+        statuses.append(step.status)
+        assert step.passively_safe and step.verify().ok, step.explain()
+        way = follow(controller.robot, x, step.control, 0.1)
+        places = people[:, :2] + np.linspace(0, 0.1, 11)[:, None, None] * people[:, 2:]
+        gaps = np.hypot(*np.moveaxis(places - way[:, None, :2], -1, 0)) - BODY - 0.5
+        is_moving = np.hypot(*np.diff(way[:, :2], axis=0).T).max() > 1e-4
+        assert not is_moving or gaps[:, gaps[0] >= 0].min(initial=1.0) >= -1e-5
+        x = advance(x, step.control, 0.1)
+        people[:, :2] += 0.1 * people[:, 2:]
+    assert "kept" in statuses
+
+
+@pytest.mark.slow
+def test_a_robot_that_was_passively_safe_is_never_hit_while_it_moves() -> None:
+    """Corridors and open floor, people of constant velocity who aim at its way; on a uniform horizon."""
+    kept = 0
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        walls = [((-20.0, y), (20.0, y)) for y in (1.5, -1.5)] if seed % 2 else []
+        angles = rng.uniform(-np.pi, np.pi, 3)
+        places = rng.uniform(1.2, 6.0, (3, 1)) * np.c_[np.cos(angles), np.sin(angles)]
+        if walls:
+            places[:, 1] = places[:, 1].clip(-1.2, 1.2)
+        aims = np.c_[rng.uniform(0, 2.5, 3), np.zeros(3)] + rng.normal(0, 0.4, (3, 2))
+        courses = aims - places
+        courses *= (rng.choice([0.0, 0.5, 1.0, 1.4], 3) / np.hypot(*courses.T))[:, None]
+        people = np.c_[places, courses]
+        controller = szlib.MPCCBF(ZONE, walls=walls, settings=SETTINGS["default"])
+        x, was_safe = np.array([0.0, 0.0, 0.8 * (seed % 3 == 0), 0.0]), False
+        for _ in range(40):
+            step = controller.step(x, (6.0, 0.0), people)
+            kept += step.status == "kept"
+            was_safe |= step.passively_safe
+            way = follow(controller.robot, x, step.control, 0.1)
+            times = np.linspace(0, 0.1, 11)[:, None, None]
+            offsets = people[:, :2] + times * people[:, 2:] - way[:, None, :2]
+            gaps = np.hypot(*np.moveaxis(offsets, -1, 0)) - BODY - 0.5
+            speed = np.hypot(*way[:, 2:].T)
+            touched = (gaps < -1e-5) & (gaps[0] >= 0) & (speed > 0.05)[:, None]
+            assert not (was_safe and touched.any()), (seed, step.explain())
+            x = advance(x, step.control, 0.1)
+            people[:, :2] += 0.1 * people[:, 2:]
+    assert kept > 0

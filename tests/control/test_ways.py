@@ -934,3 +934,21 @@ def test_ways_know_a_prediction_beyond_the_horizon() -> None:
     (places,) = find_places([person], later)
     assert places == pytest.approx(np.array([(0.5, 0), (1, 0), (1, 0), (1, 0)]))
     assert places[2] == pytest.approx(person.after(6.0).position)
+
+
+@pytest.mark.parametrize("angle", [0.3, 0.9, 2.1, 2.8])
+@pytest.mark.parametrize("r_robot", [0.1, 0.2])
+def test_a_small_robot_takes_a_door_in_which_it_fits(r_robot, angle) -> None:
+    """A room of 10 m with a wall across, and a door that leaves 5 cm to each side of disc and margin."""
+    half = r_robot + 0.05 + 0.05
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    lines = np.array([[(0.0, -5.0), (0.0, -half)], [(0.0, half), (0.0, 5.0)]])
+    corners = 5.0 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    room = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    walls = np.concatenate([lines, room]) @ turn
+    settings = szlib.MPCSettings.among_people(r_robot=r_robot)
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
+    start, goal = np.array([(-2.5, 0.0), (2.5, 0.0)]) @ turn
+    step = controller.step((*start, 0.0, 0.0), goal)
+    assert not step.goal_blocked
+    assert "through the door" in step.way
