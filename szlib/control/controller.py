@@ -75,16 +75,17 @@ def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) ->
     held = s.dt * np.array(s.step_lengths[: len(inputs)])
     velocities = np.vstack([state[2:], held[:, None] * inputs]).cumsum(axis=0)
     last = velocities[-1]
-    fastest = max(np.abs(last).max(), 1e-12)  # no division by 0 at rest
+    fastest = np.abs(last).max()
     piece = s.dt * max(1, ceil(fastest / s.a_max / s.dt / _MOST_PIECES))
-    slower = np.append(np.arange(fastest, 0.0, -s.a_max * piece)[1:], 0.0) / fastest
+    n = ceil(fastest / s.a_max / piece - 1e-9)  # none at rest
+    slower = np.maximum(1 - np.arange(1, n + 1) * s.a_max * piece / fastest, 0.0)
     velocities = np.vstack([velocities, slower[:, None] * last])
     lengths = np.append(held, np.full_like(slower, piece))
     moved = lengths[:, None] * (velocities[1:] + velocities[:-1]) / 2
     points = np.vstack([state[:2], moved]).cumsum(axis=0)
     times = np.append(0.0, lengths).cumsum()
-    changes = np.hypot(*(velocities[1:] - velocities[:-1]).T)
-    return Path(points, times, changes * lengths / 8)
+    bows = np.hypot(*(velocities[1:] - velocities[:-1]).T) * lengths / 8
+    return Path(points, times, bows)
 
 
 class DoubleIntegrator:
@@ -179,8 +180,8 @@ def as_controller(controller: Any) -> Controller:
     """
     if isinstance(controller, Controller):
         return controller
-    expected = "an object with reset and step"
-    check_argument(hasattr(controller, "step"), "controller", controller, expected)
+    is_one = hasattr(controller, "step")
+    check_argument(is_one, "controller", controller, "an object with reset and step")
     found = Controller()
     for name in ("reset", "step", "settings", "zone", "walls", "obstacles", "robot"):
         value = getattr(controller, name, None)

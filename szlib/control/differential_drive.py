@@ -280,8 +280,9 @@ class DifferentialDrive(MPCCBF):
         self.chord_error = way / 2 * tan(asin(way / 2 / self.ahead) / 2)
         radius = s.r_robot + (s.eps + self.ahead + self.chord_error)
         self._wheels = _Wheels(self.ahead, self.v_max)
-        margin = "required" if s.margin == "paper" else s.margin
-        return replace(s, r_robot=radius, eps=0.0, v_max=self.v_max, margin=margin)
+        if s.margin == "paper":
+            s = replace(s, margin="required")
+        return replace(s, r_robot=radius, eps=0.0, v_max=self.v_max)
 
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
@@ -323,13 +324,15 @@ class DifferentialDrive(MPCCBF):
         point = Step(**found)
         asked = self._seen = point.scene
         planned = point.planned[:2]
-        times = self._s.times[:2]
-        _, (control,) = self._wheels.follow(self._own, planned[:, :2], times)
+        _, (control,) = self._wheels.follow(
+            self._own, planned[:, :2], self._s.times[:2]
+        )
         self._command = control.copy()
         self._planned_velocity = planned[1, 2:]
-        state = self.robot.body(self._own)
-        scene = self._make_scene(state, self._goal, asked.tracked)
-        found |= {"control": control, "scene": scene, "of_point": asked}
+        found["scene"] = self._make_scene(
+            self.robot.body(self._own), self._goal, asked.tracked
+        )
+        found |= {"control": control, "of_point": asked}
         return DriveStep(**found, own=self._own, wheels=self._wheels)
 
     def _choose_heading(self, scene: Scene) -> Heading:

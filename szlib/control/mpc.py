@@ -153,8 +153,12 @@ class MPCCBF(Controller):
     ) -> None:
         self._settings = MPCSettings() if settings is None else settings
         is_one = isinstance(self.settings, MPCSettings)
-        expected = "MPCSettings, such as MPCSettings.among_people()"
-        check_argument(is_one, "settings", settings, expected)
+        check_argument(
+            is_one,
+            "settings",
+            settings,
+            "MPCSettings, such as MPCSettings.among_people()",
+        )
         self._s = self._plan_with(self.settings)
         self.zone = _choose_zone(zone, self._s.zone_speed)
         self.tracker = tracker or Tracker()
@@ -195,16 +199,21 @@ class MPCCBF(Controller):
 
     def _take_obstacles(self, obstacles: Iterable[Obstacle]) -> None:
         """Build what is fixed, of the walls and these `obstacles`."""
-        is_list = isinstance(obstacles, Iterable)
-        check_argument(is_list, "obstacles", obstacles, "a list of obstacles")
+        check_argument(
+            isinstance(obstacles, Iterable),
+            "obstacles",
+            obstacles,
+            "a list of obstacles",
+        )
         others = tuple(obstacles)
         for each in others:
-            is_one = isinstance(each, Obstacle)
-            check_argument(is_one, "an obstacle", each, "an Obstacle")
+            check_argument(
+                isinstance(each, Obstacle), "an obstacle", each, "an Obstacle"
+            )
             each.check()
         self._obstacles = others
-        ends = self._segments.reshape(-1, 4).tolist()
-        items = [*(Wall(*each) for each in ends), *others]
+        walls = (Wall(*each) for each in self._segments.reshape(-1, 4).tolist())
+        items = [*walls, *others]
         self._fixed = Obstacles.of(items, self._s)
         self._fixed_of_disc = Obstacles.of(items, self.settings)
         self._ways = WayFinder(self._fixed, self._s)
@@ -268,9 +277,8 @@ class MPCCBF(Controller):
         clock = self._clock
         self._planner.check_thread()
         faults = clock.tick(now, stamps)
-        age = check_number("state_age", state_age)
         goal = check_point("goal", goal)
-        x, towards = self._locate(state, goal, age)
+        x, towards = self._locate(state, goal, check_number("state_age", state_age))
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._make_scene(x, towards, tracked, is_point=True)
         heading = self._choose_heading(scene)
@@ -301,31 +309,35 @@ class MPCCBF(Controller):
         """State now, from a `state` of this `age`, and `goal` of the point that is planned for."""
         x = check_vector("state", state, 4)
         if age:
-            at = self._clock.bring_forward(self.robot, np.array(x), age, np.zeros(2))
-            x = at.tolist()
+            x = self._clock.bring_forward(
+                self.robot, np.array(x), age, np.zeros(2)
+            ).tolist()
         return x, goal
 
     def _choose(
         self, scene: Scene, heading: Heading
     ) -> tuple[Status, Plan, tuple[bool, bool]]:
-        """The plan, or full braking, and what the guard says of it."""
+        """The plan if it is safe; else the best of full braking, the rest of the last plan, and the plan.
+
+        And whether it touches nothing fixed, and whether it overlaps no body besides.
+        """
+        velocity = scene.state[2:]
         status, plan = self._decide(scene, heading)
-        brakes, is_safe = self._guard(scene, plan)
-        if not all(is_safe) and self._s.guard:
-            rest = plan._replace(inputs=self._find_rest(scene.state[2:]))
-            keeps = self._guard(scene, rest)
-            if all(keeps[1]):
-                status = "kept"
-                plan = rest
-                brakes, is_safe = keeps
-        if brakes:
-            inputs = plan_braking(self._s, scene.state[2:])
-            status = "braking"
-            plan = plan._replace(inputs=inputs)
+        inputs = plan.inputs
+        rank = self._check(scene, inputs)
+        if self._s.guard and not all(rank[:2]):
+            found: Any = {rank: (status, inputs)}
+            for name, other in (
+                ("kept", self._find_rest(velocity)),
+                ("braking", plan_braking(self._s, velocity)),
+            ):
+                found[self._check(scene, other)] = name, other
+            rank = max(found)
+            status, inputs = found[rank]
         if self._clock.has_begun:
-            self._change = plan.inputs - self._plan
-        self._plan = plan.inputs
-        return status, plan, is_safe
+            self._change = inputs - self._plan
+        self._plan = inputs
+        return status, plan._replace(inputs=inputs), rank[:2]
 
     def _find_rest(self, velocity: Sequence[float]) -> Array:
         """The rest of the last plan, and then braking, for a robot of this `velocity`, shape (N, 2) [m/s2].
@@ -337,8 +349,8 @@ class MPCCBF(Controller):
         rest = self._plan.repeat(lengths, axis=0)[1:]
         last = plan_braking(s, velocity + s.dt * rest.sum(axis=0))[:1]
         begins = lengths.cumsum() - lengths
-        sums = np.add.reduceat(np.vstack([rest, last]), begins)
-        return np.asarray(sums / lengths[:, None])
+        rest = np.vstack([rest, last])
+        return np.asarray(np.add.reduceat(rest, begins) / lengths[:, None])
 
     def _finish(self, **found: Any) -> Any:
         """What the robot does, by what was `found`."""
@@ -356,12 +368,12 @@ class MPCCBF(Controller):
         state = scene.state
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
         question = Question(state, heading.target, last, _shrink_zones(scene, heading))
-        guess = self._plan + self._change
-        plan = self._planner.plan(question, guess)
+        plan = self._planner.plan(question, self._plan + self._change)
         if heading.is_searched and not plan.timed_out:
             targets = np.gradient(heading.ways[0].at(s.times), s.times, axis=0)[1:]
-            along_way = follow_velocities(s, state[2:], targets)
-            other = self._planner.plan(question, along_way)
+            other = self._planner.plan(
+                question, follow_velocities(s, state[2:], targets)
+            )
             plan = min(plan, other, key=lambda each: each.rank)
             plan = plan._replace(timed_out=other.timed_out)
         if plan.violations == (inf,):
@@ -370,38 +382,28 @@ class MPCCBF(Controller):
             other = self._planner.plan(question, plan_braking(s, state[2:]))
             if other.rank < plan.rank:
                 return "restarted", other
-        is_too_fast = hypot(*state[2:]) > s.v_max + TOLERANCE
-        return "relaxed" if plan.is_relaxed or is_too_fast else "optimal", plan
+        if plan.is_relaxed or hypot(*state[2:]) > s.v_max + TOLERANCE:
+            return "relaxed", plan
+        return "optimal", plan
 
-    def _guard(self, scene: Scene, plan: Plan) -> tuple[bool, tuple[bool, bool]]:
-        """True if the robot is to brake (see this module), and what holds for what it does then.
+    def _check(self, scene: Scene, inputs: Array) -> tuple[bool, bool, float]:
+        """Whether the robot touches nothing fixed, and overlaps no body besides, and the least gap, to order.
 
-        That is whether it touches nothing fixed, and whether it overlaps no body besides.
+        If it brakes after one step of the `inputs`. For bodies it is enough if that holds while it follows
+        all of them, and then brakes. The gap is that to bodies, or to what it touches; 0 at most [m].
         """
-        s = self._s
-        walls, bodies = self._find_near(scene, plan.inputs[0])
+        walls, bodies = self._find_near(scene, inputs[0])
         if not (walls.groups or bodies.groups):
-            return False, (True, True)
-
-        def follow(n: int) -> Path:
-            """Where the robot goes that follows `n` steps of the plan, and then brakes."""
-            return self._carry(find_stopping_path(scene.state, plan.inputs[:n], s))
-
-        path = follow(1)
+            return True, True, 0.0
+        path = self._carry(find_stopping_path(scene.state, inputs[:1], self._s))
         wall = walls.bound(path)
         body = self._bound_bodies(bodies, path)
-        walls_safe = wall.is_safe
-        is_safe = body.is_safe or self._bound_bodies(bodies, follow(s.N)).is_safe
-        if (walls_safe and is_safe) or not s.guard:
-            return False, (walls_safe, walls_safe and is_safe)
-        path = follow(0)
-        braked = walls.bound(path), self._bound_bodies(bodies, path)
-        before, after = (body, braked[1]) if walls_safe else (wall, braked[0])
-        spares_wall = walls_safe and not braked[0].is_safe
-        if spares_wall or after.seen < min(-TOLERANCE, before.seen):
-            return False, (walls_safe, False)
-        walls_safe, is_safe = (each.is_safe for each in braked)
-        return True, (walls_safe, walls_safe and is_safe)
+        is_safe = body.is_safe
+        if not is_safe:
+            whole = self._carry(find_stopping_path(scene.state, inputs, self._s))
+            is_safe = self._bound_bodies(bodies, whole).is_safe
+        worst = body if wall.is_safe else wall
+        return wall.is_safe, wall.is_safe and is_safe, min(-TOLERANCE, worst.seen)
 
     def _find_near(self, scene: Scene, control: Array) -> tuple[Obstacles, Obstacles]:
         """The fixed obstacles that the robot may touch before it rests, and all bodies, or none if it is far.
@@ -443,8 +445,8 @@ class MPCCBF(Controller):
         if not overlaps.any():
             return bodies.bound(path)
         bound = bodies.select_near(np.where(overlaps, inf, 0.0)).bound(path)
-        places = bodies.groups[0].numbers[overlaps, :2]
-        towards = float(((places - begin) @ moved.T).max())
+        offsets = bodies.groups[0].numbers[overlaps, :2] - begin
+        towards = float((offsets @ moved.T).max())
         if towards > 0:
             bound = Bound(min(bound.lower, -towards), min(bound.seen, -towards))
         return bound
@@ -470,8 +472,7 @@ class MPCCBF(Controller):
             ]
             numbers = np.array(placed)
             if [each for each in people if each.prediction]:
-                knots = [list_knots(each, s) for each in people]
-                numbers = np.hstack([numbers, knots])
+                numbers = np.hstack([numbers, [list_knots(each, s) for each in people]])
             offsets = np.array(len(people) * [s.r_robot + s.eps])
             zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
@@ -490,8 +491,8 @@ class MPCCBF(Controller):
             time = max(abs(vx), abs(vy)) / s.a_max
             target = x + vx * time / 2, y + vy * time / 2
         elif scene.people and not heading.ways:
-            zones = scene.zones.groups[0].numbers.tolist()
-            target = find_target(at, target, zones, self._fixed, s)
+            ((_, numbers, _),) = scene.zones.groups
+            target = find_target(at, target, numbers.tolist(), self._fixed, s)
         return heading._replace(target=target)
 
     def zone_of(self, person: Person) -> Ellipse:
@@ -507,9 +508,10 @@ class MPCCBF(Controller):
     def _ask(
         self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person]
     ) -> Scene:
-        x = tuple(check_vector("state", state, 4))
         return self._make_scene(
-            x, check_point("goal", goal), TrackedPeople(tuple(people))
+            check_vector("state", state, 4),
+            check_point("goal", goal),
+            TrackedPeople(tuple(people)),
         )
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
@@ -570,8 +572,8 @@ def _shrink_zones(scene: Scene, heading: Heading) -> Obstacles:
     is_passed = stands & (gaps >= s.body_gap) & (h[:, -1] >= 0)
     lowest = h.min(axis=1)
     depths = np.where(is_passed & (lowest < -CELL), lowest + CELL / 3, 0.0)
-    shrunk = Group(kind, numbers, offsets + depths)
-    return scene.zones._replace(groups=(shrunk,)).joined(scene.fixed)
+    groups = (Group(kind, numbers, offsets + depths),)
+    return scene.zones._replace(groups=groups).joined(scene.fixed)
 
 
 def _choose_zone(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:

@@ -637,8 +637,9 @@ class Obstacles(NamedTuple):
     @property
     def walls(self) -> Obstacles:
         """Those that belong to the building: the robot can always stop before them."""
-        walls = [g for g in self.groups if g.kind.priority == Priority.WALL]
-        return self._replace(groups=tuple(walls))
+        return self._replace(
+            groups=tuple(g for g in self.groups if g.kind.priority == Priority.WALL)
+        )
 
     @property
     def size(self) -> int:
@@ -763,8 +764,10 @@ def find_bodies(
     last = None if as_predicted else 9
     own = [g.numbers[:, 5:last] for g in obstacles.groups if g.kind is Zone]
     gap = settings.r_robot + settings.body_gap
-    groups = (Group(Body, each, np.full(len(each), gap)) for each in own)
-    return Obstacles(tuple(groups), settings.r_robot)
+    return Obstacles(
+        tuple(Group(Body, each, np.full(len(each), gap)) for each in own),
+        settings.r_robot,
+    )
 
 
 def rebuild(kind: type[Obstacle], numbers: Sequence[float]) -> Obstacle:

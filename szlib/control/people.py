@@ -138,8 +138,9 @@ class Prediction:
         left = self.times > seconds
         if not left.any():
             return None
-        times = self.times[left] - seconds
-        return Prediction(times, self.positions[left], self.spread[left])
+        return Prediction(
+            self.times[left] - seconds, self.positions[left], self.spread[left]
+        )
 
 
 def list_knots(person: Person, settings: MPCSettings) -> Array:
@@ -429,8 +430,10 @@ class Tracker:
             times = [now] * len(listed)
             if stamps is not None:
                 times = np.full(len(listed), stamps, float).tolist()
-            rows = zip(listed, names, times, strict=True)
-            measured = [(*self._read(each, name), name, t) for each, name, t in rows]
+            measured = [
+                (*self._read(each, name), name, time)
+                for each, name, time in zip(listed, names, times, strict=True)
+            ]
             return measured, Counter(names)
         except (TypeError, ValueError, OverflowError) as error:
             raise SolverError(
@@ -476,8 +479,9 @@ class Tracker:
             if name not in given
         }
         nearest = min(away, key=away.__getitem__, default=None)
-        is_same = away.get(nearest, inf) <= SAME_PLACE
-        return self._last_seen.pop(nearest) if is_same else None
+        if away.get(nearest, inf) > SAME_PLACE:
+            return None
+        return self._last_seen.pop(nearest)
 
     def _identify(
         self, person: Person, name: Hashable, last: _LastSeen | None
@@ -488,8 +492,11 @@ class Tracker:
         is_slow = hypot(vx, vy) < self.walking_speed and not person.stands
         if heading is None or (is_slow and heading == atan2(vy, vx)):
             heading = last[0].heading if last else None
-        is_unknown = heading is None
-        known: Any = {"id": name, "heading": heading, "heading_unknown": is_unknown}
+        known: Any = {
+            "id": name,
+            "heading": heading,
+            "heading_unknown": heading is None,
+        }
         is_same = known.items() <= vars(person).items()
         return person if is_same else replace(person, **known)
 

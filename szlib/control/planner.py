@@ -277,8 +277,8 @@ class Program:
             if solved is None:
                 break
             found = solved
-            left = lower[rows] - self.slopes[rows] @ found[0]
-            lower[rows] -= np.maximum(left, 0.0) + 1e-9
+            allowed = np.minimum(lower[rows], self.slopes[rows] @ found[0])
+            lower[rows] = allowed - 1e-9
             prices[rows] = 0.0
         return found
 
@@ -375,10 +375,10 @@ class Planner:
         barriers = question.barriers
         states = build_horizon(s).states(np.array(question.state), inputs)
         x, y = states[:, :2].T
-        speed = np.hypot(*states[:, 2:].T).max()
-        reach = (speed + barriers.speeds) * _find_reach_time(s)
-        travel = barriers.find_travel(x, y, s.times, s.body_gap)
-        return np.asarray(travel.min(axis=1) - reach)
+        reach = np.hypot(*states[:, 2:].T).max() + barriers.speeds
+        reach *= _find_reach_time(s)
+        travel = barriers.find_travel(x, y, s.times, s.body_gap).min(axis=1)
+        return np.asarray(travel - reach)
 
     def _plan_among(self, question: Question, guess: Array) -> Plan:
         """The plan for a `question`, with all its obstacles.
@@ -397,8 +397,9 @@ class Planner:
         """The program of a `question`; `has_floors` as of `list_conditions`."""
         obstacles = question.barriers
         if has_floors:
-            bodies = find_bodies(obstacles, self.settings, as_predicted=True)
-            obstacles = obstacles.joined(bodies)
+            obstacles = obstacles.joined(
+                find_bodies(obstacles, self.settings, as_predicted=True)
+            )
         groups = obstacles.groups
         key = has_floors, *[(kind, *of.shape) for kind, of, _ in groups]
         program = self._programs.get(key)

@@ -239,8 +239,8 @@ class MPCSettings:
         is_used = not (counts and changes.get("grid", True))
         check_argument(is_used, "N and N_h", changes, expected)
         chosen = cls(**own | changes)
-        reach = sum(own["grid"]) * chosen.dt * chosen.v_max
-        return replace(chosen, lookahead=changes.get("lookahead", reach + 1.0))
+        farther = 1.0 + sum(own["grid"]) * chosen.dt * chosen.v_max
+        return replace(chosen, lookahead=changes.get("lookahead", farther))
 
     @cached_property
     def step_lengths(self) -> tuple[int, ...]:

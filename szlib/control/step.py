@@ -77,8 +77,9 @@ class Scene(NamedTuple):
     @property
     def goal_blocked(self) -> bool:
         """True if h < 0 at the goal, because of something fixed or of a person who stands; or in a solid."""
-        h = self.find_standing_h(*self.goal)
-        return self.is_solid(*self.goal) or bool((h < 0).any())
+        return self.is_solid(*self.goal) or bool(
+            (self.find_standing_h(*self.goal) < 0).any()
+        )
 
     def is_solid(self, x: float, y: float) -> bool:
         """True if walls enclose the place (`x`, `y`) [m]."""
@@ -162,8 +163,9 @@ class Step:
     @cached_property
     def planned(self) -> Array:
         """States x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s]."""
-        horizon = build_horizon(self.asked.settings)
-        return horizon.states(np.array(self.asked.state), self.inputs)
+        return build_horizon(self.asked.settings).states(
+            np.array(self.asked.state), self.inputs
+        )
 
     @cached_property
     def predicted(self) -> Array:
@@ -238,8 +240,8 @@ class Step:
 
         Also of rest at the end, if the plan must end there [m/s].
         """
-        hard = [each for each in self._rows if each.is_hard(self.asked.settings)]
-        return max(0.0, *(-float(each.values.min()) for each in hard))
+        s = self.asked.settings
+        return max(0.0, *(-float(r.values.min()) for r in self._rows if r.is_hard(s)))
 
     @property
     def feasible(self) -> bool:

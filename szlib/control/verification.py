@@ -284,8 +284,9 @@ def _measure(
         else:
             measure = each.distance if is_barrier else each.gap
             measured = measure(*points.T, times, *each.numbers)
-        margin = each.margin(s) if is_barrier else 0.0
-        found.append(measured - s.r_robot - margin)
+        if is_barrier:
+            measured = measured - each.margin(s)
+        found.append(measured - s.r_robot)
     return np.reshape(found, (-1, len(points)))
 
 

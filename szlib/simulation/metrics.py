@@ -95,7 +95,7 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     flagged_steps : steps that are reported as not safe; 0 for a controller without claims.
     unflagged_violations : steps with a safety claim that lead to h < 0.
     unflagged_overlaps : steps with a safety claim that lead to a Euclidean overlap.
-    steps_optimal, steps_relaxed, steps_restarted, steps_braking : steps of each `Step.status`.
+    steps_optimal, steps_relaxed, steps_restarted, steps_kept, steps_braking : steps of each `Step.status`.
     max_slack : largest violation of a row without a price by any plan; NaN if the controller reports none.
     solve_time_median, solve_time_p95, solve_time_p99, solve_time_max : of `Step.solve_time`, or of the call.
 

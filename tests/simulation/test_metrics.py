@@ -103,7 +103,7 @@ def test_steps_are_counted_if_their_control_is_applied():
     """The person is in the way: h < 0 within 1.25 m of them, an overlap within 0.75 m."""
     states = with_speeds([2.0] * 11)  # x = 0, 0.2, ..., 2.0
     n, person = len(states), (2.0, 0.0)
-    statuses = {"optimal": 2, "restarted": 1, "relaxed": 3, "braking": 4}
+    statuses = {"optimal": 2, "restarted": 1, "relaxed": 2, "kept": 1, "braking": 4}
     status = np.array([*np.repeat(list(statuses), list(statuses.values())), "optimal"])
     safe = np.arange(n) != 7
     slack = np.array([0.0, 2e-6, *[0.1] * 8, 5.0])

@@ -17,7 +17,7 @@ KEYS = {
     "success", "time_to_goal", "path_length", "min_h", "min_clearance", "min_speed", "mean_speed",
     "max_speed", "time_stopped", "time_yielding", "passing_side", "infeasible_steps",
     "solve_time_median", "solve_time_p95", "solve_time_max", "outcome",
-    "steps_optimal", "steps_relaxed", "steps_restarted", "steps_braking",
+    "steps_optimal", "steps_relaxed", "steps_restarted", "steps_kept", "steps_braking",
     "min_h_people", "min_h_walls", "jerk", "people", "walls", "flagged_steps", "unflagged_violations",
     "unflagged_overlaps", "min_clearance_people", "min_clearance_walls",
     "max_slack", "solve_time_p99", "violations", "overlaps", "claimed_safe_steps",
