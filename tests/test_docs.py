@@ -171,12 +171,10 @@ def test_the_five_results_are_those_of_the_tables():
     ahead = table("25_claims").query(
         "data == 'ATC day' and claim == 'the zone reaches farther ahead than behind'"
     )
-    n = ahead.set_index("method")["n"]
     assert ahead["verdict"].str.startswith("not decidable").all()
-    assert (
-        f"{n['respect, strangers']}, {n['quantile, strangers']} and {n['quantile, null model']} enc"
-        in text
-    )
+    respect = ahead.set_index("method").loc["respect, strangers"]
+    assert f"{respect['n']} strangers meet head-on or cross, 150 are needed" in text
+    assert "150 encounters of people who cross or come towards" in respect["verdict"]
 
     cells = table("28_matrix").set_index(["claim", "source", "condition"]).sort_index()
     in_front = cells.loc[
@@ -200,14 +198,16 @@ def test_the_five_results_are_those_of_the_tables():
     assert f"{zones - drawn['plazas']} resamples) with our gamma, 0.05;" in text
     assert "with 0.4, that of the paper's code, of none" in text
 
-    rule = table("03_outliers").query(
-        "intruders == 0.0025 and rule == '0.2 %, 20 neighbours'"
+    own_size = table("03_outliers").query("plazas == 6 and first_seed == 0")
+    own_size = own_size.set_index(["intruders", "pace", "rule"])["error"]
+    few, slow = own_size[0.0025, "rushing"], own_size[0.01, "slow"]
+    rules = [f"0.2 %, {number} neighbours" for number in (20, 200)]
+    off = "the zone is {:.0f} cm off with 20, {:.0f} cm with 200".format(
+        *(100 * few[rule] for rule in rules)
     )
-    own_size = rule.query("plazas == 6")
-    own_size = own_size.sort_values("encounters")
-    assert len(own_size) == 2
-    assert "{:.0f} and {:.0f} cm off".format(*100 * own_size["error"]) in text
-    assert "at {:,} and {:,} encounters".format(*own_size["encounters"]) in text
+    assert off in text
+    assert {f"{slow[rule]:.1f}" for rule in rules} == {"0.7"}
+    assert "with 1 % slow ones 0.7 m with both" in text
 
     ours = (
         table("21_rollouts").query("set == 'all'").set_index("formulation").loc["szlib"]

@@ -90,7 +90,7 @@ def main(names: list[str]) -> None:
                 print(source.stem, flush=True)
                 refresh(source, "atc-1hz")
                 if source.stem == "01_tracks":
-                    copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png", colours=24)
+                    copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png", colours=20)
         return
     for source in chain(*runner.split_batches(folders.list_notebooks())):
         if not names or any(folders.has_name(source, name) for name in names):
