@@ -32,9 +32,7 @@ def served(tmp_path, monkeypatch):
     )
     threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     monkeypatch.delenv(datasets.DATA_DIR_VARIABLE, raising=False)
-    monkeypatch.setattr(
-        datasets.pooch, "os_cache", lambda name: tmp_path / "cache" / name
-    )
+    monkeypatch.setattr("pooch.os_cache", lambda name: tmp_path / "cache" / name)
     url = f"http://127.0.0.1:{server.server_port}/"
     change(monkeypatch, "atc-1hz", url=url, hashes={"a.csv": sha256(home / "a.csv")})
     yield home
