@@ -19,12 +19,12 @@ because people enter neither the condition nor the braking (`Step.walls_safe`).
 *Bodies.* A control is passively safe if, with people who keep their velocity, the robot overlaps no body
 while it moves: if it brakes after dt, or if it follows its plan to the end and brakes there. It must not
 move towards a body that it overlaps already, by more than the curve within a step of the plan. If it is not
-passively safe, the robot follows the rest of the plan before, if that is, or brakes, if that is better. So if
-it was passively safe once, it stays so, and is at rest when somebody walks into it, while people keep their
-velocity (`Step.passively_safe`; passive safety: Macek et al., ECMR 2009). With a `grid` this holds nearly
-always: of its long steps the rest has the mean. It ends where walls do not leave way for the rest.
-Walls go first: if a control is safe for walls, the robot brakes for a body only if braking is safe for walls,
-too.
+passively safe, the robot follows the rest of the plan before, if that is, or brakes, if that is better. So
+if it was passively safe once, it stays so as long as it overlaps nobody and people keep their velocity, and
+is at rest when somebody walks into it (`Step.passively_safe`; passive safety: Macek et al., ECMR 2009). With
+a `grid` this holds nearly always: of its long steps the rest has the mean. It ends where walls do not leave
+way for the rest. Walls go first: if a control is safe for walls, the robot brakes for a body only if braking
+is safe for walls, too.
 
 The terminal condition
 ----------------------
@@ -326,14 +326,18 @@ class MPCCBF(Controller):
         inputs = plan.inputs
         rank = self._check(scene, inputs)
         if self._s.guard and not all(rank[:2]):
-            found: Any = {rank: (status, inputs)}
-            for name, other in (
-                ("kept", self._find_rest(velocity)),
-                ("braking", plan_braking(self._s, velocity)),
-            ):
-                found[self._check(scene, other)] = name, other
-            rank = max(found)
-            status, inputs = found[rank]
+            rest = self._find_rest(velocity)
+            kept = self._check(scene, rest)
+            brake = plan_braking(self._s, velocity)
+            braked = self._check(scene, brake)
+            if kept[1]:
+                status = "kept"
+                inputs = rest
+                rank = kept
+            elif braked >= rank:
+                status = "braking"
+                inputs = brake
+                rank = braked
         if self._clock.has_begun:
             self._change = inputs - self._plan
         self._plan = inputs

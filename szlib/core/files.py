@@ -2,8 +2,8 @@
 
 Every file is written here: completely, or not at all. A folder of results holds a marker file, `.szlib`. Its
 first line says what the folder is for. A folder that holds other files and no marker is never written into.
-Neither is a folder that holds the input data. What a killed process left unfinished in such a folder is
-removed an hour later, by the next one that uses the folder.
+Neither is a folder that holds the input data. What a killed process left unfinished in a claimed folder (not
+in folders in it) is removed an hour later, by the next one that claims it.
 """
 
 from __future__ import annotations
@@ -105,10 +105,6 @@ def claim_folder(folder: str | Path, purpose: str) -> Path:
             for entry in folder.iterdir()
             if not (entry.name.startswith(MARKER) or (entry / MARKER).is_file())
         )
-    for part in folder.glob(f"{_PART}*"):
-        with suppress(OSError):
-            if part.stat().st_mtime < time.time() - _ABANDONED:
-                part.unlink()
     owner = folder_purpose(folder)
     if owner is None and foreign:
         raise StorageError(
@@ -122,6 +118,10 @@ def claim_folder(folder: str | Path, purpose: str) -> Path:
         )
     elif owner != purpose:
         raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
+    for part in folder.glob(f"{_PART}*"):
+        with suppress(OSError):
+            if part.stat().st_mtime < time.time() - _ABANDONED:
+                part.unlink()
     return folder
 
 

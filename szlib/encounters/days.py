@@ -4,7 +4,7 @@ In the folder `out` each day has two files: ``<day>.parquet``, its samples and t
 ``<day>.parquet.json``, their checksum and what they are made of: the content of the day's files, every
 parameter, and the version of szlib.  Each file is written atomically.  A day whose two files match is not
 computed again, so a run that was stopped or killed continues where it ended.  Then a file of the same inode,
-size and times is not even read.  A day that fails leaves no result, not even an earlier one.
+size and times is not even read.  A day whose files cannot be used has no result, not even an earlier one.
 """
 
 from __future__ import annotations
@@ -264,8 +264,8 @@ class Extraction:
             ["file", "encounter"], sort=False
         ).ngroup()
         names = samples["day"] + " (" + samples.pop("file") + ")"
-        n_files = names.groupby(samples["day"]).transform("nunique")
-        samples["day"] = samples["day"].where(n_files == 1, names).astype("category")
+        is_one = names.groupby(samples["day"]).transform("nunique") == 1
+        samples["day"] = samples["day"].where(is_one, names).astype("category")
         return funnels.attach(samples, _add_stages(parts.values()))
 
     def __str__(self) -> str:
@@ -331,7 +331,9 @@ def extract_days(
     }
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     excluded = {exclude} if isinstance(exclude, str) else set(map(str, exclude))
-    files = sorted({file.absolute() for file in datasets.find(paths)})
+    # a file of several names once; links keep their names
+    found = {file.resolve(): file.absolute() for file in datasets.find(paths)}
+    files = sorted(found.values())
     recipe = find_recipe(files, recipe, **of_recipe)
     folder = claim_folder(out, PURPOSE)
     days: dict[str, dict[Path, Any]] = {}
@@ -339,8 +341,8 @@ def extract_days(
         [state] = find_states([file])
         day = find_day(file, recipe) or printable(name)
         days.setdefault(day, {})[file] = state
-    for day in excluded - days.keys():
-        warn(f"{day} is excluded, but there is no such day: there are {sorted(days)}")
+    if unknown := sorted(excluded - days.keys()):
+        warn(f"{', '.join(unknown)}: excluded, but there is no such day")
     included = {day: days[day] for day in sorted(days.keys() - excluded)}
     shared = [day for day in included if has_calendar(day) or len(included) == 1]
     common = settings
@@ -437,6 +439,6 @@ def extract_day(
         }
     except Exception as error:  # whatever fails in one day, the others go on
         row["why"] = printable(error if isinstance(error, SzlibError) else repr(error))
-        with suppress(OSError):  # the result of an earlier file is not that of this one
-            (out / f"{day}.parquet.json").unlink()
+        if type(error) is DataError:  # an earlier result is not that of this file
+            (out / f"{day}.parquet.json").unlink(missing_ok=True)
     return row | {"seconds": time.perf_counter() - start}

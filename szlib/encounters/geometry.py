@@ -142,8 +142,12 @@ def Square(x: tuple[float, float], y: tuple[float, float]) -> Area:
     """
     x0, x1 = x
     y0, y1 = y
-    is_square = -np.inf < x0 < x1 < np.inf and -np.inf < y0 < y1 < np.inf
-    require(is_square, "x and y of a square", (x, y), "finite, each (lowest, highest)")
+    require(
+        -np.inf < x0 < x1 < np.inf and -np.inf < y0 < y1 < np.inf,
+        "x and y of a square",
+        (x, y),
+        "finite, each (lowest, highest)",
+    )
     return Area(shapely.box(x0, y0, x1, y1))
 
 

@@ -97,10 +97,14 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
             f"the samples have no column kind; found {list(samples.columns)}; find_encounters gives it"
         )
     selected = samples[samples["kind"].isin(wanted)].copy()
-    others = [kind for kind in KINDS if kind not in wanted]
-    rejected = {kind: int((samples["kind"] == kind).sum()) for kind in others}
-    name = f"samples: {', '.join(names)}"
-    stage = funnels.stage(name, len(samples), len(selected), rejected)
+    rejected = {
+        kind: int((samples["kind"] == kind).sum())
+        for kind in KINDS
+        if kind not in wanted
+    }
+    stage = funnels.stage(
+        f"samples: {', '.join(names)}", len(samples), len(selected), rejected
+    )
     return funnels.attach(selected, [*funnels.get(samples), stage])
 
 

@@ -221,8 +221,9 @@ def null_encounters(
     def find(shift: int) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Samples and encounters of a `shift`."""
         drawn = _draw(seconds, minutes, np.random.default_rng((seed, shift)))
-        moved = _move(tracks, visitors, drawn[leader], rows.recorded)
-        samples = find_encounters(moved, settings=settings)
+        samples = find_encounters(
+            _move(tracks, visitors, drawn[leader], rows.recorded), settings=settings
+        )
         groups = samples.groupby("encounter", sort=False)
         nearest = groups.agg(kind=("kind", "first"), nearest=("distance", "min"))
         is_near = samples["distance"] <= r_max

@@ -150,8 +150,7 @@ class TrackRows:
         """The `values` that lie `steps` [ticks] after the rows `at`; NaN past a gap."""
         start = at[..., None]
         there = (start + steps) % len(self)  # beyond the ends: another piece
-        is_same = self.piece[there] == self.piece[start]
-        return np.where(is_same, values[there], np.nan)
+        return np.where(self.piece[there] == self.piece[start], values[there], np.nan)
 
     def approach(self, pairs: np.ndarray, begin: Any, end: Any) -> np.ndarray:
         """Nearest approach of `pairs` of rows (2, n) from `begin` to `end` [s], if both walk on [m]."""

@@ -36,8 +36,8 @@ AHEAD = 2.0
 """Time for which two people are taken to walk on [s] (assumed)."""
 _FARTHEST = 2.0  # approaches up to this are looked at [m]
 _REACH = 6.0  # of people who may come so near within `AHEAD` [m]
-# A sound tracker ends at most so many times as many tracks at a distance as beyond, and this share of those
-# that go on beyond. (Beyond 2 m tracks end at 1 % of the samples at the ATC mall, 5 % at Grand Central.)
+# Of a sound tracker, the share of samples at which a track ends is at most _MOST times the share p beyond,
+# and at most p + _MOST_LOST (1 - p). (Beyond 2 m, p is 1 % at the ATC mall and 5 % at Grand Central.)
 _MOST = 2.0
 _MOST_LOST = 0.05
 _FEWEST = 5  # ends that say something

@@ -8,7 +8,6 @@ from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ import pandas as pd
 from .. import __version__
 from ..control import MPCSettings, Person
 from ..control.obstacles import describe, number_kinds, restore
-from ..core.errors import DataError, SzlibError
+from ..core.errors import DataError
 from ..core.files import write_file
 from ..core.input_files import open_regular
 from ..zones.ellipses import Ellipse
@@ -201,14 +200,7 @@ class SimulationLog(Run):
                 **arrays,
                 **run,
             )
-        except (
-            OSError,
-            KeyError,
-            TypeError,
-            ValueError,
-            BadZipFile,
-            SzlibError,
-        ) as error:
+        except Exception as error:  # of NumPy, zipfile, zlib or json
             raise DataError(
                 f"{file}: cannot be read as a run ({error!r}); expected a file of SimulationLog.save"
             ) from error

@@ -433,6 +433,7 @@ def test_a_robot_that_was_passively_safe_is_never_hit_while_it_moves() -> None:
         for _ in range(40):
             step = controller.step(x, (6.0, 0.0), people)
             kept += step.status == "kept"
+            assert step.passively_safe or step.status != "kept"
             was_safe |= step.passively_safe
             way = follow(controller.robot, x, step.control, 0.1)
             times = np.linspace(0, 0.1, 11)[:, None, None]

@@ -937,10 +937,10 @@ def test_ways_know_a_prediction_beyond_the_horizon() -> None:
 
 
 @pytest.mark.parametrize("angle", [0.3, 0.9, 2.1, 2.8])
-@pytest.mark.parametrize("r_robot", [0.1, 0.2])
+@pytest.mark.parametrize("r_robot", [0.1, 0.15])
 def test_a_small_robot_takes_a_door_in_which_it_fits(r_robot, angle) -> None:
-    """A room of 10 m with a wall across, and a door that leaves 5 cm to each side of disc and margin."""
-    half = r_robot + 0.05 + 0.05
+    """A room of 10 m with a wall across, and a door that leaves 1 cm to each side of disc and margin."""
+    half = r_robot + 0.05 + 0.01
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     lines = np.array([[(0.0, -5.0), (0.0, -half)], [(0.0, half), (0.0, 5.0)]])
     corners = 5.0 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])

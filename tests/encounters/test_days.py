@@ -143,9 +143,7 @@ def test_a_day_that_fails_leaves_no_earlier_result(days, tmp_path):
 
 
 def test_an_excluded_day_that_does_not_exist_is_named(days, tmp_path):
-    with pytest.warns(
-        szlib.DataWarning, match="hall is excluded, but there is no such"
-    ):
+    with pytest.warns(szlib.DataWarning, match="hall: excluded, but there is no such"):
         found = extract(days[:1], tmp_path, exclude=["hall"])
     assert list(found.table["status"]) == ["done"]
 
@@ -158,7 +156,8 @@ def test_links_keep_their_names_and_the_recipe_beside_them(tmp_path):
     folder.mkdir()
     (folder / "hall.csv").symlink_to(tmp_path / "store" / "8f3a")
     szlib.Recipe(unit="cm", max_gap=2.0).save(folder / "reading.json")
-    for number, paths in enumerate((folder / "hall.csv", folder)):
+    both = [folder / "hall.csv", folder / ".." / "data" / "hall.csv"]
+    for number, paths in enumerate((folder / "hall.csv", folder, both)):
         with pytest.warns(szlib.DataWarning, match="reading.json are used"):
             found = extract(paths, tmp_path / f"out{number}", area="-1 9 -3 3")
         assert list(found.table["day"]) == ["hall"]
