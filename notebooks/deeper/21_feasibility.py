@@ -213,7 +213,7 @@ record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h
 #
 # `Step.status` says how a control was found: "optimal" (every row without a price holds), "relaxed" (the violation is as
 # small as it can be, by priorities), "restarted" (the same, found from full braking), "kept" (the rest of the last plan,
-# because the new one is not safe), or "braking" (full braking, because it is safer than the plan).
+# because only that is safe), or "braking" (full braking, because it is safer than the plan).
 #
 # *Which of the three comes nearest to the person? Which one never arrives?*
 

@@ -19,12 +19,12 @@ because people enter neither the condition nor the braking (`Step.walls_safe`).
 *Bodies.* A control is passively safe if, with people who keep their velocity, the robot overlaps no body
 while it moves: if it brakes after dt, or if it follows its plan to the end and brakes there. It must not
 move towards a body that it overlaps already, by more than the curve within a step of the plan. If it is not
-passively safe, the robot follows the rest of the plan before, if that is, or brakes, if that is better. So
-if it was passively safe once, it stays so as long as it overlaps nobody and people keep their velocity, and
-is at rest when somebody walks into it (`Step.passively_safe`; passive safety: Macek et al., ECMR 2009). With
-a `grid` this holds nearly always: of its long steps the rest has the mean. It ends where walls do not leave
-way for the rest. Walls go first: if a control is safe for walls, the robot brakes for a body only if braking
-is safe for walls, too.
+passively safe, the robot brakes, if that is better, or follows the rest of the plan before, if only that is
+safe. So if it was passively safe once, it stays so as long as it overlaps nobody and people keep their
+velocity, and is at rest when somebody walks into it (`Step.passively_safe`; passive safety: Macek et al.,
+ECMR 2009). With a `grid` this holds nearly always: of its long steps the rest has the mean. It ends where
+walls do not leave way for the rest. Walls go first: if a control is safe for walls, the robot brakes for a
+body only if braking is safe for walls, too.
 
 The terminal condition
 ----------------------
@@ -317,7 +317,7 @@ class MPCCBF(Controller):
     def _choose(
         self, scene: Scene, heading: Heading
     ) -> tuple[Status, Plan, tuple[bool, bool]]:
-        """The plan if it is safe; else the best of full braking, the rest of the last plan, and the plan.
+        """The plan if it is safe; else the rest of the last one if only that is; else braking or the plan.
 
         And whether it touches nothing fixed, and whether it overlaps no body besides.
         """
@@ -330,7 +330,7 @@ class MPCCBF(Controller):
             kept = self._check(scene, rest)
             brake = plan_braking(self._s, velocity)
             braked = self._check(scene, brake)
-            if kept[1]:
+            if kept[1] and not braked[1]:
                 status = "kept"
                 inputs = rest
                 rank = kept

@@ -28,7 +28,7 @@ _MEANING: dict[Status, str] = {
     "optimal": "optimal, every row without a price holds",
     "relaxed": "relaxed by priorities: walls, bodies, zones, decay",
     "restarted": "relaxed by priorities, from full braking",
-    "kept": "the rest of the last plan, which is safe, as the new one is not",
+    "kept": "the rest of the last plan, which is safe, as neither the new one nor braking is",
     "braking": "full braking",
 }
 
@@ -106,8 +106,8 @@ class Step:
     inputs : accelerations of the plan, shape (N, 2) [m/s2].
     status : "optimal": the plan satisfies every row without a price. "relaxed": it violates the least, by
         priorities. "restarted": the same, found from full braking instead of from the last plan. "kept": the
-        rest of the last plan, because it is passively safe, and the new one is not. "braking": full braking,
-        because it is safer than the plan, or there is none.
+        rest of the last plan, because only that is passively safe. "braking": full braking, because it is
+        safer than the plan, or there is none.
     walls_safe : True if the robot, which holds the control for dt and then brakes as hard as it can, touches
         nothing fixed. A robot that was walls_safe once stays so, whatever people do: see `szlib.control.mpc`.
     passively_safe : True if, besides, it overlaps no body while it moves, if people keep their velocity: if
