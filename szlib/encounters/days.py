@@ -417,9 +417,9 @@ def extract_day(
                     described = thread.submit(
                         describe_source, files, settings, recipe, source
                     )
-                    near = partial(select_near, settings)
                     tracks = interpolate(
-                        merge_files(loaded, select=near), recipe.max_gap
+                        merge_files(loaded, select=partial(select_near, settings)),
+                        recipe.max_gap,
                     )
                     samples = find_encounters(tracks, settings=settings)
                 source = described.result()
@@ -440,5 +440,6 @@ def extract_day(
     except Exception as error:  # whatever fails in one day, the others go on
         row["why"] = printable(error if isinstance(error, SzlibError) else repr(error))
         if type(error) is DataError:  # an earlier result is not that of this file
-            (out / f"{day}.parquet.json").unlink(missing_ok=True)
+            with suppress(OSError):
+                (out / f"{day}.parquet.json").unlink()
     return row | {"seconds": time.perf_counter() - start}

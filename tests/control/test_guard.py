@@ -392,7 +392,7 @@ def test_a_post_is_seen_by_the_guard_though_the_paper_hardly_sees_it() -> None:
 
 
 def test_a_safe_plan_is_kept_where_the_new_one_is_not_safe() -> None:
-    """A corridor of 3 m: one person comes from behind, another crosses; who brakes stops in front of them."""
+    """A person comes from behind, another one crosses: a robot that brakes stops in front of them."""
     walls = [((-20.0, y), (20.0, y)) for y in (1.5, -1.5)]
     people = np.array([[-4.701, 0.65, 0.497, -0.05], [-1.234, -0.996, 0.956, 1.023]])
     controller = szlib.MPCCBF(

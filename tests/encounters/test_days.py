@@ -148,6 +148,24 @@ def test_an_excluded_day_that_does_not_exist_is_named(days, tmp_path):
     assert list(found.table["status"]) == ["done"]
 
 
+def test_a_result_that_cannot_be_removed_does_not_stop_the_other_days(
+    days, tmp_path, monkeypatch
+):
+    copies = [tmp_path / day.name for day in days[:2]]
+    for copy, day in zip(copies, days, strict=False):
+        copy.write_bytes(day.read_bytes())
+    extract(copies, tmp_path / "out")
+    copies[0].write_text("no table\n")
+    error = OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    def refuse(path, missing_ok=False):
+        raise error
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    found = extract(copies, tmp_path / "out").table
+    assert "kept" in list(found["status"]) and "failed" in list(found["status"])
+
+
 def test_links_keep_their_names_and_the_recipe_beside_them(tmp_path):
     walk = pd.DataFrame({"t": np.arange(9.0), "id": 1, "x": np.arange(9.0), "y": 0.0})
     (tmp_path / "store").mkdir()
