@@ -197,9 +197,7 @@ class Extraction:
             if day in excluded:
                 continue
             with reading(
-                file,
-                "as an extracted day",
-                "one of this version; extract the day again",
+                file, "as an extracted day", "this version; extract the day again"
             ):
                 sources[day] = json.loads(read_small(file))["made_of"]
                 parameters = dict(sources[day]["parameters"])
