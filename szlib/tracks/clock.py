@@ -147,8 +147,8 @@ def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
         ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows"
     )
     row, columns, n_covered = _on_clock(t, raw[["x", "y"]].to_numpy(float).T, within)
-    day = raw["day"].astype("category").array.take(row)
-    columns = [day, raw["id"].to_numpy()[row], *columns]
+    day = raw["day"].astype("category").array
+    columns = [day.take(row), raw["id"].to_numpy()[row], *columns]
     table = pd.DataFrame(dict(zip(COLUMNS, columns, strict=True)), copy=False)
     n_lost = len(t) - n_covered
     if n_lost > _MOST_LOST * len(t) + _FEW:
@@ -158,8 +158,8 @@ def interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
             f"Excel's days, {advise(time_unit='days')}"
         )
     table.attrs |= {k: raw.attrs[k] for k in ("area", "recipe") if k in raw.attrs}
-    rejected = {"in a gap-free piece that covers no tick": n_lost}
-    stage = funnels.stage("clock: samples", len(t), n_covered, rejected)
+    reason = "in a gap-free piece that covers no tick"
+    stage = funnels.stage("clock: samples", len(t), n_covered, {reason: n_lost})
     sizes = np.diff(np.flatnonzero(np.r_[True, ~within, True]))
     stage["recorded"] = {
         "squares": int(sizes @ sizes),
@@ -241,8 +241,7 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     expected = "t is not a multiple of 0.1 s; bring the table to the clock with szlib.tracks.clock.to_clock"
     check_rows(tracks, np.abs(t * TICKS_PER_SECOND - tick) < 1e-3, ["t"], expected)
     order, tick, same, step = _order_rows(tracks, tick)
-    piece = np.r_[0, np.cumsum(~(same & (step == 1)))]
-    return order, tick, piece
+    return order, tick, np.r_[0, np.cumsum(~(same & (step == 1)))]
 
 
 def _order_rows(
@@ -263,8 +262,8 @@ def _order_rows(
     step = np.diff(time)
     if (same & (step <= 0)).any():
         expected = "this person has two rows at this time; keep one of them"
-        is_new = np.r_[True, ~same | (step > 0)]
-        check_rows(frame.iloc[order], is_new, ["id", "t"], expected)
+        good = np.r_[True, ~same | (step > 0)]
+        check_rows(frame.iloc[order], good, ["id", "t"], expected)
     return order, time, same, step
 
 

@@ -35,7 +35,8 @@ _PIXEL = 0.02  # metres in a pixel that an error message shows as an example
 # later than the year 5000.
 _SINCE_1970 = {1e17: "ns", 1e14: "us", 1e11: "ms", 0.0: "s"}
 _DATE = r"^(?:19|20)\d{2}-\d{2}-\d{2}"  # beginning of an ISO time
-_ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
+# end of an ISO time that states its zone
+_ZONE = r"(?:Z|[+-]\d{2}:?\d{2}|:\d{2}(?:\.\d+)?[+-]\d{2})$"
 _EXCEL_1970 = 25_569  # number of the day 1970-01-01 in Excel
 _DROPPED_BITS = 11  # bits of a hash that are left out: a float holds the others exactly
 _LARGEST_EXACT = 2.0**53  # floats hold smaller whole numbers exactly
@@ -81,8 +82,8 @@ def open_source(file: File) -> tuple[Source, Recipe]:
     columns = dict(shape.recipe.columns)
     if columns.get("day") not in source.names:
         columns.pop("day", None)
-    base = replace(shape.recipe, columns=columns)
-    return source, replace(recipe.over(base), file_format=shape.name)
+    recipe = recipe.over(replace(shape.recipe, columns=columns))
+    return source, replace(recipe, file_format=shape.name)
 
 
 def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
@@ -119,8 +120,7 @@ def load_rows(source: Source, recipe: Recipe, *, ask: bool = True) -> Rows:
     if day is not None:
         table = table.with_columns(day=day)
     if recipe.where:
-        wanted = column_of(source, recipe.where).fill_null(False)
-        table = table.filter(wanted | table["ragged"])
+        table = table.filter(column_of(source, recipe.where) | table["ragged"])
     return Rows(path, recipe, table.lazy(), source)
 
 
@@ -150,8 +150,8 @@ def metres_in_degree(latitude: float) -> tuple[float, float]:
     degree = np.radians(6_378_137.0)  # of the equator
     eccentricity = 6.694_379_990_14e-3
     root = np.sqrt(1 - eccentricity * np.sin(phi) ** 2)
-    east = degree * np.cos(phi) / root
-    return float(east), float(degree * (1 - eccentricity) / root**3)
+    north = degree * (1 - eccentricity) / root**3
+    return float(degree * np.cos(phi) / root), float(north)
 
 
 # --- which column holds what --------------------------------------------------------------------------
@@ -184,22 +184,21 @@ def find_columns(source: Source, recipe: Recipe) -> Recipe:
             raise DataError(f"{where}: {unclear}")
     found = {**given, **{name: at[name][0] for name in needed if at[name]}}
     if missing := [name for name in needed if not at[name]]:
-        known = [repr(name or k) for k, name in enumerate(names[:12])]
         columns = found | dict.fromkeys(missing, "...")
-        lacking = [str(given.get(name, name)) for name in missing]
         guess = ""
         if not any(names):
             columns = {name: given.get(name, k) for k, name in enumerate(needed)}
             guess = "name its format, such as petrack, or its fields; this is only a guess: "
         raise DataError(
-            f"{where} has no column {', '.join(lacking)}; it has {', '.join(known)}; {guess}"
-            f"{advise(columns=columns)}"
+            f"{where} has no column {', '.join(str(given.get(name, name)) for name in missing)}; "
+            f"it has {', '.join(repr(name or k) for k, name in enumerate(names[:12]))}; "
+            f"{guess}{advise(columns=columns)}"
         )
     stated = {q: _split_unit(name)[1] for q, name in found.items() if name in names}
     units = {NAMES["units"].get(stated.get(name)) for name in "xy"}
     unit = units.pop() if len(units) == 1 else None
-    clock = NAMES["time_units"].get(stated.get("t"))
-    recipe = recipe.over(Recipe(columns=found, time_unit=clock, unit=unit))
+    time_unit = NAMES["time_units"].get(stated.get("t"))
+    recipe = recipe.over(Recipe(columns=found, time_unit=time_unit, unit=unit))
     _check_units(where, recipe)
     return recipe
 
@@ -243,15 +242,19 @@ def column_of(source: Source, at: str | int) -> Series:
             )
         return source.column(at)
     lacks = f"{source.where} has no column {at}"
-    faults = exceptions.PolarsError
-    with explain_errors(lacks, "and it is no sum of columns", faults=faults):
+    advice = "it is no sum of columns and no condition either"
+    with explain_errors(lacks, advice, faults=exceptions.PolarsError):
         sum_ = pl.sql_expr(at)
         roots = sum_.meta.root_names()
         if not roots or not set(roots) <= set(names):
             raise DataError(f"{lacks}; it has {names[:12]}")
         columns = {root: source.column(names.index(root)) for root in roots}
-        if not re.search(r"\|\||'", at):
-            columns = {k: to_numbers(v, source.decimal) for k, v in columns.items()}
+        has_texts = re.search(r"\|\||'", at)
+        for root, values in columns.items():
+            # it is compared with a number
+            is_number = re.search(rf'\b{re.escape(root)}"?\s*[<>=!]+\s*[-.\d]', at)
+            if is_number or not has_texts:
+                columns[root] = to_numbers(values, source.decimal)
         return pl.DataFrame(columns).select(sum_.alias("c")).to_series()
 
 
@@ -289,8 +292,7 @@ def ask_about_recordings(
 
 def _split_unit(name: object) -> tuple[str, str]:
     """A name without blanks, accents and capitals, and its unit: ("posx", "mm") of "Pos X [mm]"."""
-    letters = unicodedata.normalize("NFKD", str(name).casefold())
-    words = re.findall(r"[^\W_]+", letters)
+    words = re.findall(r"[^\W_]+", unicodedata.normalize("NFKD", str(name).casefold()))
     is_unit = words[-1:] and words[-1] in NAMES["units"] | NAMES["time_units"]
     unit = words.pop() if is_unit and len(words) > 1 else ""
     key = "".join(words)
@@ -358,8 +360,8 @@ def to_times(
             day = moments.dt.date()
         return moments.dt.epoch("ns") / 1e9, day
     middle = numbers.drop_nans().abs().quantile(0.5) or 0.0
-    usual = next(name for least, name in _SINCE_1970.items() if middle >= least)
-    return numbers * TIME_UNITS[unit or usual], None
+    unit = unit or next(name for least, name in _SINCE_1970.items() if middle >= least)
+    return numbers * TIME_UNITS[unit], None
 
 
 def to_ids(values: Series, where: Path) -> Series:
@@ -380,8 +382,8 @@ def to_ids(values: Series, where: Path) -> Series:
         for name in names.filter(names.str.contains("\ufffd")):
             raise DataError(f"{where}: the id {name!r} is not UTF-8; save it as UTF-8")
         hashes = pd.util.hash_array(names.to_numpy().astype(object), categorize=False)
-        numbers = Series((hashes >> _DROPPED_BITS).astype("int64"))
-        return values.replace_strict(names, numbers, default=None)
+        numbers = (hashes >> _DROPPED_BITS).astype("int64")
+        return values.replace_strict(names, Series(numbers), default=None)
     is_whole = (number == number.floor()) & (number.abs() < _LARGEST_EXACT)
     whole = number.set(~is_whole, None).cast(Int64, strict=False)
     if not values.dtype.is_float():

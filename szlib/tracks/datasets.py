@@ -135,9 +135,8 @@ def _expand(name: str | Path) -> list[Path]:
             found = [file for file in path.glob("[!.]*") if file.name != FILE_NAME]
     files = sorted(filter(Path.is_file, found))
     if not files:
-        what = "no such file"
+        fault = "is no regular file" if found else "no such file"
         raise DataError(
-            f"{shown}: {'holds no file' if path.is_dir() else 'is no regular file' if found else what}; "
-            f"{expected}"
+            f"{shown}: {'holds no file' if path.is_dir() else fault}; {expected}"
         )
     return files

@@ -187,8 +187,9 @@ def rejection_reason(table: pl.DataFrame | pl.LazyFrame) -> pl.Expr:
     }
     if "day" in table.collect_schema():
         reasons["no day"] = col.day.is_null()
-    whens = [pl.when(holds).then(pl.lit(name)) for name, holds in reasons.items()]
-    return pl.coalesce(whens)
+    return pl.coalesce(
+        pl.when(holds).then(pl.lit(name)) for name, holds in reasons.items()
+    )
 
 
 # --- people -------------------------------------------------------------------------------------------

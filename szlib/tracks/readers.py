@@ -106,8 +106,8 @@ def read_raw(
     0  walk   1  0.0  0.0  0.0
     1  walk   1  0.4  0.5  0.0
     """
-    excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
-    return merge_files(load_files(paths, recipe), excluded)
+    days = [exclude] if isinstance(exclude, str) else exclude
+    return merge_files(load_files(paths, recipe), sorted(map(str, days)))
 
 
 def load_files(paths: Any, recipe: Recipe | None) -> list[LoadedFile]:
@@ -233,7 +233,9 @@ def _accept(rows: Rows, given: Recipe) -> LoadedFile:
     good = marked.filter(col.reason.is_null())
     reasons = _count_rejected(rows, bad, table.height)
     if good.height == 0:
-        raise DataError(f"{path}: holds no row; {EXPECTED}")
+        raise DataError(
+            f"{path}: holds no row{f' where {recipe.where}' if recipe.where else ''}; {EXPECTED}"
+        )
     name = f"read {path.name}"
     if recipe.frame_rate:
         name += f" at {recipe.frame_rate:g} frames/s"
@@ -258,7 +260,7 @@ def _count_rejected(rows: Rows, bad: pl.DataFrame, n: int) -> dict[str, int]:
         name = next((name for name in ("t", "x", "y") if bad[name][0] is None), "id")
         held = f" ({_show_field(rows, line, name)})"
     most = MAX_REJECTED if recipe.max_rejected is None else recipe.max_rejected
-    if n_bad <= most * n:
+    if n_bad <= most * n + 1e-6:  # an advised share is enough
         _warn_rejected(f"{rows.path.name}, first at line {line}{held}", reasons)
         return reasons
     advice = EXPECTED
@@ -288,12 +290,19 @@ def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
         warn(f"{where}: rejected rows: {', '.join(counts)}")
 
 
+def _first_rows(rows: Rows, n: int) -> pl.DataFrame:
+    """The first `n` of the `rows` that can be used."""
+    usable = rejection_reason(rows.table).is_null()
+    return rows.table.filter(usable).head(n).collect()
+
+
 def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:
     """A description of file `path`, read with a `recipe`, by its first rows; and this recipe, completed."""
     with open_rows(path, recipe) as rows:
-        usable = rejection_reason(rows.table).is_null()
-        first = rows.table.filter(usable).head(funnels.MAX_ROWS).collect()
-    return describe_rows(first, rows.recipe, path.name), rows.recipe
+        found = describe_rows(
+            _first_rows(rows, funnels.MAX_ROWS), rows.recipe, path.name
+        )
+    return found, rows.recipe
 
 
 def find_format(path: Path, recipe: Recipe) -> Recipe:
@@ -306,8 +315,7 @@ def find_format(path: Path, recipe: Recipe) -> Recipe:
 def find_day(path: Path, recipe: Recipe) -> str | None:
     """The day on which file `path`, read with a `recipe`, begins; None where it has none."""
     with suppress(DataError, OSError), open_rows(path, recipe, _HEAD) as rows:
-        usable = rejection_reason(rows.table).is_null()
-        first = rows.table.filter(usable).head(1).collect()
+        first = _first_rows(rows, 1)
         if "day" not in rows.recipe.columns:
             dates = first.get_column(
                 "day", default=local_dates(first["t"], rows.recipe)

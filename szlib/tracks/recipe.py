@@ -67,7 +67,8 @@ class Recipe:
     columns : the column that holds t or frame, id, x, y, and day (the recording): its name; the number of the
         field from 0 where the file has no header (f0, f1, ... in sums); or a sum of columns in SQL, such as
         "sec + 1e-9 * nanosec" or "(xmin + xmax) / 2".  Others are found by usual names.
-    where : rows that are read, as a condition in SQL, such as "label = 'Pedestrian'"; all values are text.
+    where : rows that are read, as a condition in SQL, such as "label = 'Pedestrian' AND score > 0.5": a value
+        in quotes is compared with texts, another one with numbers.
     frame_rate : frames a second, where times are counted in column frame.
     time_unit : unit of t, one of `TIME_UNITS`; None takes that of the column's name, else seconds, or
         milliseconds and less since 1970.
@@ -123,15 +124,18 @@ class Recipe:
                 fits = numbers.size == np.prod(shape) and np.isfinite(numbers).all()
                 require(fits, name, given, f"numbers of shape {shape}")
                 object.__setattr__(self, name, numbers.reshape(shape).tolist())
-        if self.unit in UNITS and self.scale:
-            raise DataError("both unit and scale are given; expected one of them")
+        ways = self.unit in UNITS, self.scale, self.homography, self.origin
+        if sum(map(bool, ways)) > 1:
+            raise DataError(
+                "several of unit, scale, homography and origin are given; expected one of them"
+            )
         _require_known("columns", self.columns, QUANTITIES)
         if {"t", "frame"} <= set(self.columns):
             raise DataError("columns: both t and frame are given; expected one of them")
-        is_text = isinstance(self.where, str | None)
-        require(is_text, "where", self.where, "a condition in SQL, as text")
-        unknown = f"unknown time zone {self.tz!r}"
-        with explain_errors(unknown, "expected one like 'Asia/Tokyo'"):
+        expected = "a condition in SQL, as text"
+        require(isinstance(self.where, str | None), "where", self.where, expected)
+        expected = "expected one like 'Asia/Tokyo'"
+        with explain_errors(f"unknown time zone {self.tz!r}", expected):
             ZoneInfo(self.tz or "UTC")
 
     @property
@@ -256,8 +260,7 @@ def find_recipe(
                     f"the settings in {path} are used: {arguments(recipe.as_json())}; delete it if they are "
                     "wrong"
                 )
-    given = {name: value for name, value in parameters.items() if value is not None}
-    return Recipe(**given).over(recipe)
+    return Recipe(**{k: v for k, v in parameters.items() if v is not None}).over(recipe)
 
 
 def arguments(recipe: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -94,8 +94,7 @@ def open_table(table: Any, where: Path) -> Source:
     def column(at: int) -> Series:
         """A column of the table; one of mixed types as text."""
         values = frame.iloc[:, at].reset_index(drop=True)
-        is_mixed = values.dtype.kind == "O"
-        return Series(values.astype("string") if is_mixed else values)
+        return Series(values.astype("string") if values.dtype.kind == "O" else values)
 
     return Source(where, list(map(str, frame.columns)), column)
 
@@ -140,7 +139,7 @@ def _check_batches(
 
 def open_json(file: File) -> Source:
     """A JSON `file`: an object a line, a list of objects, or points of GeoJSON."""
-    content = file.text()
+    content = replace(file, size=None).text()  # a list cannot be cut
     expected = "an object a line, a list of objects, or GeoJSON of points"
     with reading(file.path, "as JSON", expected):
         if content.lstrip().startswith("["):
@@ -155,14 +154,8 @@ def open_json(file: File) -> Source:
             ]
         else:
             rows = [json.loads(line) for line in content.splitlines() if line.strip()]
-        names = dict.fromkeys(chain.from_iterable(rows))
-        texts = {name: _as_text(row.get(name) for row in rows) for name in names}
-    return open_table(texts, file.path)
-
-
-def _as_text(values: Iterable[Any]) -> Series:
-    texts = [None if value is None else str(value) for value in values]
-    return Series(texts, dtype=pl.String)
+        table = pd.DataFrame(rows, dtype=object)
+    return open_table(table, file.path)
 
 
 def open_database(file: File) -> list[Source]:
@@ -176,30 +169,34 @@ def open_database(file: File) -> list[Source]:
         )
     address = f"{file.plain.absolute().as_uri()}?mode=ro&immutable=1"
 
-    def query(text: str) -> Iterator[Any]:
-        """The rows that a query gives, as long as memory is allowed for all of them."""
+    def query(text: str, k: int) -> Iterator[Any]:
+        """The values of column `k` that a query gives, as long as memory is allowed for them."""
         with closing(sqlite3.connect(address, uri=True)) as database:
-            found = database.execute(text)
-            some = iter(lambda: found.fetchmany(_VALUES_AT_ONCE), [])
+            values = (row[k] for row in database.execute(text))
+            some = iter(lambda: [*islice(values, _VALUES_AT_ONCE)], [])
             yield from chain.from_iterable(
-                _check_batches(
-                    some, lambda rows: sum(map(sys.getsizeof, chain(*rows))), path
-                )
+                _check_batches(some, lambda each: sum(map(sys.getsizeof, each)), path)
             )
 
     def open_one(table: str) -> Source:
-        """One of the tables; its values as text."""
-        names = [row[1] for row in query(f'PRAGMA table_xinfo("{table}")')]
-        select = f'SELECT "{{}}" FROM "{table}"'.format
-        return Source(
-            path,
-            names,
-            lambda k: _as_text(value for (value,) in query(select(names[k]))),
-        )
+        """One of the tables; its values as text.
+
+        One query gives every column: with an index, another one gives its rows in another order.
+        """
+        names = [*query(f'PRAGMA table_xinfo("{table}")', 1)]
+        columns = ", ".join(f'"{name}"' for name in names)
+        select = f'SELECT {columns} FROM "{table}"'
+
+        def column(k: int) -> Series:
+            """The column `k` as text."""
+            values = pd.Series([*query(select, k)], dtype=object)
+            return Series(values.astype("string"))
+
+        return Source(path, names, column)
 
     try:
-        names = query("SELECT name FROM sqlite_master WHERE type = 'table'")
-        return [open_one(*name) for name in names]
+        names = query("SELECT name FROM sqlite_master WHERE type = 'table'", 0)
+        return [*map(open_one, names)]
     except sqlite3.DatabaseError:
         return []
 
@@ -228,8 +225,8 @@ def _parse_trajnet(file: File) -> ParsedFile:
     lines = [json.loads(line) for line in file.text().splitlines() if line]
     rates = [line["scene"].get("fps", 2.5) for line in lines if "scene" in line]
     tracks = [line["track"] for line in lines if "track" in line]
-    rows = [each for each in tracks if each.get("prediction_number") is None]
-    table = pd.DataFrame(rows)[["f", "p", "x", "y"]].drop_duplicates(["f", "p"])
+    is_seen = [each.get("prediction_number") is None for each in tracks]
+    table = pd.DataFrame(tracks)[is_seen][["f", "p", "x", "y"]].drop_duplicates()
     frames = np.unique(table["f"])
     step = np.diff(frames).min() if len(frames) > 1 else 1.0
     return table, {"frame_rate": float(step * min(rates, default=2.5))}
@@ -270,7 +267,9 @@ def _parse_wide(file: File) -> ParsedFile:
         variable=col.variable.str.head(1).str.to_lowercase(),
     )
     rows = long.pivot("variable", index=selectors.exclude("variable", "value"))
-    return replace(open_table(rows, file.path), decimal=source.decimal), {}
+    ragged = Series(source.ragged).gather(rows["row"])
+    found = open_table(rows, file.path)
+    return replace(found, decimal=source.decimal, ragged=ragged), {}
 
 
 def _parse_level_x(file: File) -> ParsedFile:
@@ -281,11 +280,11 @@ def _parse_level_x(file: File) -> ParsedFile:
     recording = file.path.with_name(f"{stem}_recordingMeta.{ending}")
     kinds = file.path.with_name(f"{stem}_tracksMeta.{ending}")
     if recording.is_file():
-        rows = pl.read_csv(recording, infer_schema=False)
-        stated["frame_rate"] = float(rows["frameRate"][0])
+        rates = pl.read_csv(recording, infer_schema=False)["frameRate"]
+        stated["frame_rate"] = float(rates[0])
     if kinds.is_file():
-        people = pl.read_csv(kinds, infer_schema=False).select("trackId", "class")
-        table = table.join(people, "trackId", "left", maintain_order="left")
+        rows = pl.read_csv(kinds, infer_schema=False).select("trackId", "class")
+        table = table.join(rows, "trackId", "left", maintain_order="left")
         stated["where"] = "class = 'pedestrian'"
     return table, stated
 
@@ -306,8 +305,9 @@ def _parse_nuscenes(file: File) -> ParsedFile:
         person = each["instance_token"]
         kind = kinds[instances[person]["category_token"]]["name"]
         if kind.startswith("human"):
-            begin = 1e-6 * sample["timestamp"], person, *each["translation"][:2]
-            rows.append((*begin, sample["scene_token"]))
+            x, y, _ = each["translation"]
+            t = 1e-6 * sample["timestamp"]
+            rows.append((t, person, x, y, sample["scene_token"]))
     return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), {}
 
 
@@ -347,5 +347,5 @@ def _load_by_pedpy(loader: str, file: File) -> ParsedFile:
         given = {"frame_rate": _VADERE_RATE}
     load = getattr(pedpy, f"load_trajectory_from_{loader}")
     loaded = load(trajectory_file=file.plain, **given)
-    rows = pd.DataFrame(loaded.data)[["frame", "id", "x", "y"]]
-    return rows, {"frame_rate": float(loaded.frame_rate), "unit": "m"}
+    stated = {"frame_rate": float(loaded.frame_rate), "unit": "m"}
+    return pd.DataFrame(loaded.data)[["frame", "id", "x", "y"]], stated

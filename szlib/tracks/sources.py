@@ -40,7 +40,15 @@ SCAN_FACTOR = 2
 _RESERVE = 0.02  # share of a disk that unpacking leaves free
 CONTAINERS = ("PAR1", "ARROW1")  # first letters of Parquet and of Feather
 # What a recipe may say that a scan of rows cannot do: the file is then read as a whole.
-_NOT_STREAMED = {"where", "homography", "origin", "frame_rate", "time_unit"}
+_NOT_STREAMED = [
+    "columns",
+    "where",
+    "unit",
+    "homography",
+    "origin",
+    "frame_rate",
+    "time_unit",
+]
 
 
 @dataclass(frozen=True)
@@ -64,8 +72,8 @@ class File:
     def head(self) -> str:
         """The first two lines."""
         with self.plain.open("rb") as stream:
-            text = decode(stream.read(LONGEST_LINE))
-        return "\n".join(text.splitlines()[:2])
+            lines = decode(stream.read(LONGEST_LINE)).splitlines()
+        return "\n".join(lines[:2])
 
     def text(self) -> str:
         """The text, or the whole lines in its first `size` bytes."""
@@ -97,7 +105,7 @@ class Source:
     names: Sequence[str]
     column: Callable[[int], Series]
     first_line: int = 1
-    ragged: Series | bool = False
+    ragged: Any = False
     decimal: str = "."
     head: str = ""
 
@@ -238,7 +246,7 @@ def split_line(line: str, separator: str) -> list[str]:
 
 def find_separator(first: str) -> str:
     """The character between the fields of a table, by its `first` line."""
-    found = max(",;\t|", key=first.count)
+    found = max(";\t,|", key=first.count)  # numbers between semicolons may have commas
     return found if found in first else " "
 
 
@@ -256,8 +264,9 @@ def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> 
         schema={"line": String},
         raise_if_empty=False,
     )["line"]
-    first = str(lines.first() or "").strip()
-    if not first:
+    # a comment that names the columns, and a first column without a name
+    first = str(lines.first() or "").strip(" #")
+    if not first.strip():
         raise DataError(
             f"{where}, line 1: the file is empty or begins with a blank line"
         )
@@ -293,12 +302,13 @@ def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> 
 def recognise(head: str, path: Path, recipe: Recipe) -> Shape:
     """The shape in the `recipe`, or else that of a file `path` whose first two lines are `head`."""
     first = head.partition("\n")[0].strip()
-    fields = split_line(first, find_separator(first))
+    fields = set(split_line(first, find_separator(first)))
     for shape in [recipe.shape] if recipe.file_format else SHAPES.values():
         found = re.match(shape.begins, head, re.MULTILINE)
         named = re.match(shape.file, path.name)
-        is_given = recipe.has_people and "id" in shape.recipe.columns
-        fits = set(shape.header) <= set(fields) and (shape.parse or not is_given)
+        # PedPy finds the columns of such a text itself
+        is_own = shape.parse in ("", "txt") and "id" in shape.recipe.columns
+        fits = fields.issuperset(shape.header) and not (recipe.has_people and is_own)
         if found and named and fits:
             break
     groups = found.groupdict() | named.groupdict() if found and named else {}
@@ -316,7 +326,7 @@ def scan_streamed(file: File) -> Rows | None:
     recipe = file.recipe
     shape = recognise(file.head, file.path, recipe)
     is_whole = not shape.is_streamed or file.head.startswith(CONTAINERS)
-    if is_whole or _NOT_STREAMED & recipe.as_json().keys():
+    if is_whole or recipe.as_json().keys() & _NOT_STREAMED:
         return None
     recipe = replace(recipe.over(shape.recipe), file_format=shape.name)
     types: dict[Any, Any] = dict.fromkeys(recipe.columns.values(), Float64)
@@ -339,7 +349,7 @@ def scan_streamed(file: File) -> Rows | None:
         row_index_offset=1,
     )
     ragged = col("extra").is_not_null() | col(f"f{shape.n_fields - 1}").is_null()
-    values = {name: col(f"f{at}") for name, at in recipe.columns.items()}
-    table = scan.select("line", ragged=ragged, **values)
+    columns = {name: col(f"f{at}") for name, at in recipe.columns.items()}
+    table = scan.select("line", ragged=ragged, **columns)
     table = table.with_columns(col("^(x|y|speed)$") * recipe.metres)
     return Rows(file.path, recipe, table, n_bytes=file.plain.stat().st_size)

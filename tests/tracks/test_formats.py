@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import json
+import re
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +20,7 @@ from helpers.valid_tracks import check_tracks
 import szlib
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
-from szlib.tracks.readers import read_raw
+from szlib.tracks.readers import find_day, read_raw
 
 
 def expected(rows: pd.DataFrame) -> pd.DataFrame:
@@ -481,3 +483,175 @@ def test_a_quotation_mark_that_is_not_closed_loses_no_rows(tmp_path: Path) -> No
     path.write_text("\n".join(['t,id,x,y,"note"', *rows]) + "\n")
     with pytest.warns(szlib.DataWarning, match="line 52: rejected rows: 1 x missing"):
         assert len(read_raw(path)) == 199
+
+
+@pytest.mark.parametrize(
+    "schema",
+    [
+        "CREATE TABLE hall(t, id, x, y, PRIMARY KEY(id, t))",
+        "CREATE TABLE hall(t, id, x, y, PRIMARY KEY(id, t)) WITHOUT ROWID",
+        "CREATE TABLE hall(t, id, x, y); CREATE INDEX people ON hall(id)",
+    ],
+)
+def test_an_index_of_a_database_mixes_no_rows(tmp_path: Path, schema: str) -> None:
+    """With an index, SQLite gives the values of a single column in another order."""
+    rows = in_seconds(people())[["t", "id", "x", "y"]].sample(frac=1, random_state=1)
+    with sqlite3.connect(tmp_path / "hall.sqlite") as file:
+        file.executescript(schema)
+        file.executemany(
+            "INSERT INTO hall VALUES(?, ?, ?, ?)", rows.to_numpy().tolist()
+        )
+    file.close()
+    rows.to_csv(tmp_path / "hall.csv", index=False)
+    found, wanted = (read_raw(tmp_path / f"hall.{end}") for end in ("sqlite", "csv"))
+    pd.testing.assert_frame_equal(found, wanted)
+
+
+@pytest.mark.parametrize("zone", ["+09", "+0900", "+09:00"])
+def test_the_zone_of_a_time_may_be_hours_alone(tmp_path: Path, zone: str) -> None:
+    times = [f"2012-10-24 08:00:{second:02d}.5{zone}" for second in range(20)]
+    table = pd.DataFrame({"t": times, "id": 1, "x": np.arange(20.0), "y": 0.0})
+    table.to_csv(tmp_path / "hall.csv", index=False)
+    raw = read_raw(tmp_path / "hall.csv")
+    assert raw["day"].unique().tolist() == ["2012-10-24"]
+    assert raw["t"].iloc[0] == pd.Timestamp("2012-10-23T23:00:00.5Z").timestamp()
+
+
+@pytest.mark.parametrize("condition", ["kind = 'Ped' AND score > 50.5", "score > 50.5"])
+def test_a_condition_compares_texts_with_quotes_and_numbers_without(
+    tmp_path: Path, condition: str
+) -> None:
+    """As text, 9 is more than 50.5, and 100 is less."""
+    n = 40
+    table = pd.DataFrame({"t": np.arange(n), "id": 1, "x": np.arange(n), "y": 0.0})
+    table = table.assign(kind="Ped", score=np.tile([9, 10, 85, 100], n // 4))
+    table.to_csv(tmp_path / "hall.csv", index=False)
+    found = read_raw(tmp_path / "hall.csv", recipe=szlib.Recipe(where=condition))
+    assert len(found) == n // 2 and (found["t"] % 4 >= 2).all()
+
+
+def test_a_condition_that_no_row_meets_is_named(tmp_path: Path) -> None:
+    in_seconds(people()).assign(kind="Ped").to_csv(tmp_path / "hall.csv", index=False)
+    with pytest.raises(szlib.DataError, match="holds no row where kind = 'ped'"):
+        szlib.read_tracks(tmp_path / "hall.csv", where="kind = 'ped'")
+
+
+@pytest.mark.parametrize("form", ["list", "lines", "GeoJSON"])
+def test_the_day_of_a_long_json_file_is_found(tmp_path: Path, form: str) -> None:
+    """Only lines can be cut after some bytes."""
+    n = 2000
+    table = pd.DataFrame({"t": 1.35e9 + np.arange(n), "id": 1, "x": 0.0, "y": 0.0})
+    objects = table.to_dict("records")
+    features = [
+        {"properties": {"t": each["t"], "id": 1}, "geometry": {"coordinates": [0, 0]}}
+        for each in objects
+    ]
+    texts = {
+        "list": json.dumps(objects),
+        "lines": "\n".join(map(json.dumps, objects)),
+        "GeoJSON": json.dumps({"type": "FeatureCollection", "features": features}),
+    }
+    path = tmp_path / "hall.json"
+    path.write_text(texts[form])
+    recipe = szlib.Recipe(origin=(0.0, 0.0)) if form == "GeoJSON" else szlib.Recipe()
+    assert find_day(path, recipe) == "2012-10-12"
+
+
+@pytest.mark.parametrize("name", ["person", "Agent", "pedestrian", "personne", "人物"])
+def test_a_box_belongs_to_one_person_whatever_the_id_is_called(
+    tmp_path: Path, name: str
+) -> None:
+    rows = in_seconds(people())
+    boxes = pd.DataFrame({"t": rows["t"], name: rows["id"]})
+    for corner, side in ((1, -0.5), (2, 0.5)):
+        boxes[f"x{corner}"] = rows["x"] + side
+        boxes[f"y{corner}"] = rows["y"] + side
+    boxes.to_csv(tmp_path / "hall.csv", index=False)
+    found = read_raw(tmp_path / "hall.csv", recipe=szlib.Recipe(scale=1.0))
+    assert len(found) == len(rows) and found["id"].nunique() == rows["id"].nunique()
+
+
+def test_a_row_of_a_wide_table_with_another_number_of_fields_is_rejected(
+    tmp_path: Path,
+) -> None:
+    lines = ["t,x1,y1,x2,y2", *(f"{k},{k},0,{k},5" for k in range(40))]
+    lines[21], lines[31] = "20,20,5,0,20,5", "30,30,0"
+    (tmp_path / "hall.csv").write_text("\n".join(lines))
+    with pytest.warns(szlib.DataWarning, match="missing or extra fields"):
+        found = read_raw(tmp_path / "hall.csv")
+    assert not set(found["t"]) & {20.0, 30.0} and len(found) == 76
+
+
+def test_texts_of_numpy_pandas_and_spreadsheets_are_read_by_the_names_given(
+    tmp_path: Path,
+) -> None:
+    """A header after #, a first column without a name, and decimal commas between semicolons."""
+    rows = in_seconds(people())[["t", "id", "x", "y"]].round(3)
+    commas = rows.map(lambda each: f"{each:.3f}".replace(".", ",")).assign(
+        id=rows["id"]
+    )
+    columns = dict(
+        zip(("t", "id", "x", "y"), ("Zeit", "Nr", "Ost", "Nord"), strict=True)
+    )
+    named = rows.rename(columns=columns)
+    header = " ".join(columns.values())
+    np.savetxt(tmp_path / "numpy.txt", rows, header=header, fmt="%.3f %d %.3f %.3f")
+    named.to_csv(tmp_path / "pandas.txt", sep="\t")
+    commas.to_csv(tmp_path / "sheet.txt", sep=";", index=False, header=False)
+    for name, at in (("numpy", columns), ("pandas", columns), ("sheet", range(4))):
+        chosen = at if at is columns else dict(zip(columns, at, strict=True))
+        found = read_raw(tmp_path / f"{name}.txt", recipe=szlib.Recipe(columns=chosen))
+        n_lost = len(rows) - len(found)
+        assert n_lost <= (name == "sheet"), name  # its first row may be a header
+        assert found["id"].nunique() == rows["id"].nunique(), name
+
+
+@pytest.mark.parametrize(
+    "changes", [{"unit": "px"}, {"unit": "deg"}, {"columns": {"x": "f2 + 100"}}]
+)
+def test_a_long_table_of_numbers_is_read_as_its_recipe_says(
+    tmp_path: Path, changes: dict[str, Any]
+) -> None:
+    """A file of eight numbers a row is scanned only if its recipe is simple."""
+    rows = in_seconds(people())
+    table = np.column_stack([rows[["t", "id", "x", "y"]], np.zeros((len(rows), 4))])
+    np.savetxt(tmp_path / "hall.csv", table, delimiter=",", fmt="%.6g")
+    if "unit" in changes:
+        with pytest.raises(szlib.DataError, match=r"pass (scale|origin)="):
+            read_raw(tmp_path / "hall.csv", recipe=szlib.Recipe(**changes))
+    else:
+        given = {"t": 0, "id": 1, "y": 3, **changes["columns"]}
+        recipe = szlib.Recipe(columns=given, scale=1.0)
+        found = read_raw(tmp_path / "hall.csv", recipe=recipe)
+        assert found["x"].mean() == pytest.approx(rows["x"].mean() + 100, abs=1e-3)
+
+
+@pytest.mark.parametrize("n_bad", [29, 50, 57, 58])
+def test_the_advised_share_of_rejected_rows_is_enough(
+    tmp_path: Path, n_bad: int
+) -> None:
+    lines = ["t,id,x,y", *(f"{k},1,{k},0" for k in range(100))]
+    lines[1 : 1 + n_bad] = n_bad * ["0,1,?,0"]
+    path = tmp_path / "hall.csv"
+    path.write_text("\n".join(lines))
+    with pytest.raises(szlib.DataError) as refused:
+        read_raw(path)
+    share = re.search(r"max_rejected=([\d.]+)", str(refused.value))
+    assert share
+    with pytest.warns(szlib.DataWarning, match=f"{n_bad} x missing"):
+        raw = read_raw(path, recipe=szlib.Recipe(max_rejected=float(share[1])))
+    assert len(raw) == 100 - n_bad
+
+
+@pytest.mark.parametrize(
+    "ways",
+    [
+        {"unit": "mm", "homography": np.eye(3)},
+        {"scale": 0.8, "homography": np.eye(3)},
+        {"unit": "cm", "origin": (0.0, 0.0)},
+        {"unit": "m", "scale": 2.0},
+    ],
+)
+def test_two_ways_to_metres_are_refused(ways: dict[str, Any]) -> None:
+    with pytest.raises(szlib.DataError, match="several of unit, scale, homography"):
+        szlib.Recipe(**ways)

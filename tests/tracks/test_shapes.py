@@ -362,3 +362,15 @@ def test_a_homography_maps_a_raw_day_too(tmp_path):
 def test_a_condition_that_is_no_text_is_refused():
     with pytest.raises(szlib.DataError, match="where must be a condition in SQL"):
         szlib.Recipe(where=("id", "8"))
+
+
+def test_a_second_place_in_trajnet_is_counted(tmp_path: Path) -> None:
+    """Two recordings in one file: nobody is dropped in silence."""
+    lines = [
+        json.dumps({"track": {"f": k, "p": 1, "x": x, "y": float(k)}})
+        for x in (0.0, 9.0)
+        for k in range(50)
+    ]
+    (tmp_path / "two.ndjson").write_text("\n".join(lines))
+    with pytest.raises(szlib.DataError, match="50 of 100 rows give a person a second"):
+        szlib.read_tracks(tmp_path / "two.ndjson")
