@@ -436,7 +436,7 @@ Markdown(
     f"""**What we know now.** {len(vertices)} of {len(points):,} samples make the hull, and its slice at
 {zone_speed:g} m/s leaves a zone whose smallest ellipse is {fitted.semi_axes[0]:.2f} m x {fitted.semi_axes[1]:.2f} m. The
 zone is smallest at {smallest:.2f} m/s; near {low:.1f} m/s, where condition 4 ends the data, and near {high:.1f} m/s,
-where few people walk so fast, the hull closes and the zone is large. Another encounter never makes it larger, and makes it smaller if somebody comes nearer than the hull allows: chapter 05 estimates a zone that does not depend on their number, and says how far to
+where few people walk so fast, the hull closes and the zone is large. Another encounter that is no outlier never makes it larger, and makes it smaller if somebody comes nearer than the hull allows: chapter 05 estimates a zone that does not depend on their number, and says how far to
 trust it."""
 )
 

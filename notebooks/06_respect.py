@@ -123,8 +123,8 @@ real_day.compare_with_plaza(
 # chance to take notice of each other is lost.
 #
 # (The plaza of this chapter is a busier one: its people are watched for 20 s, not 3.4 s, so that shifted people meet.
-# So some walk beside each other long enough to count as companions. And 2 % of the encounters have an intruder, as in
-# chapter 03. We call people who walk through the zones of others *careless*.)
+# So some walk beside each other long enough to count as companions. And 2 % of the encounters have an intruder (1 % in
+# chapter 03). We call people who walk through the zones of others *careless*.)
 #
 # ```python
 # samples = szlib.find_encounters(tracks)

@@ -354,8 +354,8 @@ Markdown(
 # %% [markdown]
 # ## All four scenarios: what is due to what?
 #
-# Chapters 09 to 11 drive each scenario twice. Three things that can change these runs differ between the paper's chain
-# and ours: the zone, the margin around walls, and the rule of the side (*side rule* in the table). **What do you think?** Which
+# Chapters 09 to 11 drive each scenario by the paper's chain and by ours. Three things that can change these runs differ
+# between them: the zone, the margin around walls, and the rule of the side (*side rule* in the table). **What do you think?** Which
 # of them changes a run, and in which scenario? Each row of the table is the paper's chain with one of the three changed.
 
 # %% jupyter={"source_hidden": true}
