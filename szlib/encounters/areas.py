@@ -107,7 +107,7 @@ def place_apart(tracks: pd.DataFrame) -> pd.DataFrame:
         return tracks
     metres = (tracks["x"].round(3) // 1).groupby(places)
     low = metres.min()
-    width = metres.max() - metres.min() + _APART
+    width = metres.max() - low + _APART
     begin = low.iloc[0] + width.cumsum().shift(fill_value=0)
     return tracks.assign(x=tracks["x"] + places.map(begin - low))
 
@@ -162,8 +162,9 @@ def walked_area(tracks: pd.DataFrame, *, space: AttentionalSpace = PAPER_SPACE) 
         )
     low, high = np.quantile(walks[["x", "y"]], [_OUTLYING, 1 - _OUTLYING], axis=0)
     cell = max(_CELL, (high - low).max() / _MOST_CELLS)
-    seen = _join_cells((tracks[["x", "y"]] / cell).round().drop_duplicates(), cell)
-    place = seen.intersection(shapely.box(*low, *high))
+    place = _join_cells(
+        (tracks[["x", "y"]] / cell).round().drop_duplicates(), cell
+    ).intersection(shapely.box(*low, *high))
     # in two steps, which is faster
     grown = place.buffer(_GAP / 4).buffer(0.75 * _GAP)
     # positions are anywhere in their cells, which reach half a cell too far on each side

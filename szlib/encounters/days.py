@@ -144,6 +144,14 @@ def _add_stages(samples: Iterable[pd.DataFrame]) -> list[dict[str, Any]]:
     )
 
 
+def _find_excluded(exclude: Iterable[str], days: Iterable[str]) -> set[str]:
+    """The days to `exclude`, one or several; a DataWarning names those that are not among the `days`."""
+    excluded = {exclude} if isinstance(exclude, str) else set(map(str, exclude))
+    if unknown := sorted(excluded.difference(days)):
+        warn(f"{', '.join(unknown)}: excluded, but there is no such day", 3)
+    return excluded
+
+
 @dataclass(frozen=True, eq=False)
 class Extraction:
     """Result of `extract_days`.
@@ -178,7 +186,9 @@ class Extraction:
 
     @classmethod
     def load(cls, out: str | Path, *, exclude: Iterable[str] = ()) -> Extraction:
-        """Load the days that `extract_days` left in the folder `out`, but not those in `exclude`.
+        """Load the days that `extract_days` left in the folder `out`, but not those to `exclude`.
+
+        `exclude` is a day or several.  A DataWarning names those that the folder does not hold.
 
         Raises
         ------
@@ -186,16 +196,18 @@ class Extraction:
             left, or a day is damaged.
         """
         folder = Path(out)
-        excluded = set(map(str, exclude))
         if folder_purpose(folder) != PURPOSE:
             raise DataError(
                 f"{folder}: holds no extracted days; expected a folder of `szlib extract`"
             )
         sources: dict[str, dict[str, Any]] = {}
-        for file in sorted(folder.glob("*.parquet.json")):
-            day = file.name.removesuffix(".parquet.json")
-            if day in excluded:
-                continue
+        files = {
+            file.name.removesuffix(".parquet.json"): file
+            for file in folder.glob("*.parquet.json")
+        }
+        excluded = _find_excluded(exclude, files)
+        for day in sorted(files.keys() - excluded):
+            file = files[day]
             with reading(
                 file, "as an extracted day", "this version; extract the day again"
             ):
@@ -300,8 +312,8 @@ def extract_days(
         same for all days of a calendar; recordings without a calendar have each their own.
     recipe : how files are read.
     n_jobs : number of processes; -1 takes all cores, or all workers of ``joblib.parallel_config("dask")``.
-    exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.  A
-        DataWarning names those that are no day of the files.
+    exclude : a day "YYYY-MM-DD", or several, to leave out, as event days were in the paper (sec. 2); they are
+        not read.  A DataWarning names those that are no day of the files.
     progress : whether to show a bar over the days.
     parameters : single values in place of those of `settings` and `recipe`, such as area or unit.
 
@@ -328,10 +340,10 @@ def extract_days(
         if each.name in parameters and each.name != "area"
     }
     settings = (settings or EncounterSettings()).with_parameters(parameters)
-    excluded = {exclude} if isinstance(exclude, str) else set(map(str, exclude))
     # a file of several names once; links keep their names
-    found = {file.resolve(): file.absolute() for file in datasets.find(paths)}
-    files = sorted(found.values())
+    files = sorted(
+        {file.resolve(): file.absolute() for file in datasets.find(paths)}.values()
+    )
     recipe = find_recipe(files, recipe, **of_recipe)
     folder = claim_folder(out, PURPOSE)
     days: dict[str, dict[Path, Any]] = {}
@@ -339,8 +351,7 @@ def extract_days(
         [state] = find_states([file])
         day = find_day(file, recipe) or printable(name)
         days.setdefault(day, {})[file] = state
-    if unknown := sorted(excluded - days.keys()):
-        warn(f"{', '.join(unknown)}: excluded, but there is no such day")
+    excluded = _find_excluded(exclude, days)
     included = {day: days[day] for day in sorted(days.keys() - excluded)}
     shared = [day for day in included if has_calendar(day) or len(included) == 1]
     common = settings
@@ -370,8 +381,9 @@ def extract_days(
             disable=not progress or None,
         )
     )
-    for day in days.keys() & excluded:
-        rows.append(_ROW | {"day": day, "files": len(days[day])})
+    rows += [
+        _ROW | {"day": day, "files": len(days[day])} for day in days.keys() & excluded
+    ]
     table = pd.DataFrame(rows, columns=list(_ROW)).sort_values("day", ignore_index=True)
     sources = {row["day"]: row["source"] for row in rows if "source" in row}
     if len(shared) == len(included):

@@ -95,12 +95,13 @@ def find_encounters(
     samples["kind"] = kinds_of_pairs(rows.person[pairs], near)[number]
     samples.attrs |= {"area": str(area), "area_reason": area.reason}
     stages = [
+        *funnels.get(tracks),
         funnels.stage(
             "encounters: ticks that open a window", len(rows), len(first), missed
         ),
         funnels.stage("encounters: windows", len(first), len(chosen), rejected),
     ]
-    funnels.attach(samples, [*funnels.get(tracks), *stages])
+    funnels.attach(samples, stages)
     return of_kind(samples, kinds)
 
 
@@ -248,7 +249,7 @@ def select_near(
     t, x, y = map(pl.col, "txy")
     # on the inner side of each edge
     inner = [x >= box.x[0], x <= box.x[1], y >= box.y[0], y <= box.y[1]]
-    times = {f"{k}": pl.when(each).then(t) for k, each in enumerate(inner)}
+    times = {str(k): pl.when(each).then(t) for k, each in enumerate(inner)}
     margin = 2 * max_gap + VELOCITY_SPAN + _TIME_ROUNDING
     spans = (
         rows.lazy()

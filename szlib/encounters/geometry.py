@@ -94,8 +94,10 @@ class Area:
     @property
     def outlines(self) -> list[np.ndarray]:
         """Every border, outer and inner, closed, each (n, 2) [m]."""
-        rings = shapely.get_rings(shapely.get_parts(self.polygon))
-        return [shapely.get_coordinates(ring) for ring in rings]
+        return [
+            shapely.get_coordinates(ring)
+            for ring in shapely.get_rings(shapely.get_parts(self.polygon))
+        ]
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
@@ -214,4 +216,6 @@ PAPER_SPACE = AttentionalSpace()
 
 def wrap_angle(angle: np.ndarray) -> np.ndarray:
     """Wrap each `angle` [rad] to (-pi, pi]."""
-    return np.pi - (np.pi - angle) % (2 * np.pi)
+    turn = 2 * np.pi
+    # A remainder can be rounded up to the whole turn, so it is taken twice.
+    return np.pi - (np.pi - angle) % turn % turn

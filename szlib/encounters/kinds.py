@@ -114,7 +114,7 @@ def find_units(rows: TrackRows, whole: np.ndarray) -> np.ndarray:
     `whole` are the numbers of the `rows` at whole seconds, among which companions are sought.
     """
     found = find_neighbours(rows.place[whole], rows.moment[whole], NEAR)
-    pairs = np.sort(rows.person[whole][np.concatenate(list(found), axis=1)], axis=0)
+    pairs = np.sort(rows.person[whole][np.hstack(list(found))], axis=0)
     pairs, seconds = np.unique(pairs, axis=1, return_counts=True)
     pairs = pairs[:, seconds >= TOGETHER - 1]
     a, b = pairs[:, np.asarray(kinds_of_pairs(pairs, rows) == COMPANIONS)]

@@ -40,7 +40,7 @@ MINUTES = (1.0, 10.0)
 SHORTEST = 10.0
 """Least shift [s]: longer than two people see each other (assumed)."""
 
-_STORED = 12_000  # pairs whose samples are stored, over all shifts
+_STORED = 12_000  # pairs whose samples are stored, over all shifts; rounded up in each
 
 
 def time_shifted(
@@ -95,8 +95,12 @@ def _draw(
 ) -> np.ndarray:
     """Draw shifts [s] of `minutes` (shortest, longest) either way, in recordings of so many `seconds`."""
     low, high = (60 * float(each) for each in minutes)
-    is_range = 0 < low <= high < np.inf
-    require(is_range, "minutes", minutes, "(shortest, longest), both positive")
+    require(
+        0 < low <= high < np.inf,
+        "minutes",
+        minutes,
+        "(shortest, longest), both positive",
+    )
     share = np.minimum(seconds / (low + high), 1)
     if low * share.min() < SHORTEST:
         raise DataError(
@@ -224,17 +228,20 @@ def null_encounters(
         samples = find_encounters(
             _move(tracks, visitors, drawn[leader], rows.recorded), settings=settings
         )
-        groups = samples.groupby("encounter", sort=False)
-        nearest = groups.agg(kind=("kind", "first"), nearest=("distance", "min"))
+        nearest = samples.groupby("encounter", sort=False).agg(
+            kind=("kind", "first"), nearest=("distance", "min")
+        )
         is_near = samples["distance"] <= r_max
-        far = f"farther than {r_max} m"
-        close = funnels.select(samples, is_near, "samples: close", far)
+        close = funnels.select(
+            samples, is_near, "samples: close", f"farther than {r_max} m"
+        )
         return close, nearest.reset_index()
 
     parameters = {"moved": "units", "seed": seed, "minutes": list(minutes)}
     parameters |= settings.as_json()
-    null = _search(find, shifts, r_max, parameters, crowd.sensor, progress)
-    return null.of_kind(kinds)
+    return _search(find, shifts, r_max, parameters, crowd.sensor, progress).of_kind(
+        kinds
+    )
 
 
 def null_pairs(
@@ -260,8 +267,8 @@ def null_pairs(
 
     Returns
     -------
-    `szlib.NullEncounters` with the nearest approach of all pairs of the kinds compared, the samples of at
-    most 12,000 of them, drawn evenly from the shifts, and what the data says about the sensor (`sensor`).
+    `szlib.NullEncounters` with the nearest approach of all pairs of the kinds compared, the samples of
+    about 12,000 of them, drawn evenly from the shifts, and what the data says about the sensor (`sensor`).
 
     Raises
     ------
@@ -291,8 +298,13 @@ def null_pairs(
         every["nearest"] = met.nearest[counted]
         return crowd.sample(tracks, met, stored, r_max), every
 
-    parameters = {"moved": "streams", "seed": seed, "minutes": list(minutes)}
-    parameters |= {"kinds": list(COMPARED), "area": str(place)}
+    parameters = {
+        "moved": "streams",
+        "seed": seed,
+        "minutes": list(minutes),
+        "kinds": list(COMPARED),
+        "area": str(place),
+    }
     return _search(find, shifts, r_max, parameters, crowd.sensor, progress)
 
 
@@ -312,7 +324,7 @@ def _search(
     require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
     offset = 0
     found = []
-    for shift in tqdm(range(shifts), unit="shift", disable=None if progress else True):
+    for shift in tqdm(range(shifts), unit="shift", disable=not progress or None):
         samples, encounters = (
             each.assign(shift=shift, encounter=each["encounter"] + offset)
             for each in find(shift)
@@ -320,9 +332,11 @@ def _search(
         found.append((samples, encounters))
         offset = encounters["encounter"].to_numpy().max(initial=offset - 1) + 1
     all_samples, all_encounters = zip(*found, strict=True)
-    table = pd.concat(all_samples, ignore_index=True)
     return NullEncounters(
-        funnels.attach(table, funnels.add(map(funnels.get, all_samples))),
+        funnels.attach(
+            pd.concat(all_samples, ignore_index=True),
+            funnels.add(map(funnels.get, all_samples)),
+        ),
         pd.concat(all_encounters, ignore_index=True),
         shifts,
         float(r_max),

@@ -34,6 +34,8 @@ def find_neighbours(
 ) -> Iterator[np.ndarray]:
     """Yield blocks of pairs of rows at one moment, at most `reach` [m] apart along both axes, each once.
 
+    There is one block at least; without a row it is empty.
+
     Parameters
     ----------
     place : positions x + iy, shape (n,) [m].
@@ -45,6 +47,7 @@ def find_neighbours(
     The rows of the two people of each pair, shape (2, n).
     """
     if len(place) == 0:
+        yield np.empty((2, 0), int)
         return
     # All moments one after the other on a line, farther apart than the reach.
     length = np.ptp(place.real) + 2 * reach
@@ -178,10 +181,8 @@ def find_occupants(
     other = np.full(len(rows), -1)
     reach = float(np.hypot(*space.corners.T).max()) + _ROUNDING
     for pairs in find_neighbours(rows.place[inside], rows.moment[inside], reach):
-        ref, oth = inside[np.concatenate([pairs, pairs[::-1]], axis=1)]
-        is_ready = ready[ref]
-        ref = ref[is_ready]
-        oth = oth[is_ready]
+        both = inside[np.hstack([pairs, pairs[::-1]])]
+        ref, oth = both[:, ready[both[0]]]
         seen = (rows.place[oth] - rows.place[ref]) * rows.ahead[ref].conj()
         within = space.contains(seen.real, seen.imag)
         people += np.bincount(ref[within], minlength=len(rows))
@@ -212,14 +213,13 @@ def sample_rows(
 
     The time is that of the reference pedestrian: in a shifted crowd they differ.
     """
-    days = tracks["day"].astype("category")
     at = rows.order[ref]
     ids = tracks["id"].to_numpy()
     seen = rows.place[other] - rows.place[ref]
     heading, other_heading = (np.angle(rows.velocity[each]) for each in (ref, other))
     columns = [
         encounter,
-        days.iloc[at].array,
+        tracks["day"].astype("category").iloc[at].array,
         ids[at],
         ids[rows.order[other]],
         rows.tick[ref] / TICKS_PER_SECOND,

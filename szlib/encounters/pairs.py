@@ -78,6 +78,10 @@ def find_pairs(
 ) -> pd.DataFrame:
     """Find every pair of people who come within `r_max` of each other in the area, each pair once.
 
+    Pairs are sought at whole seconds. A pair can be missed if its two people are not both seen at a whole
+    second at most 0.5 s from a moment at which they are near: a track begins or ends beside the other person.
+    In crowds that were made up 3 of 1,362 pairs were missed, and 12 of 1,478 where each track had a gap.
+
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks` (any row order, left untouched).
@@ -90,7 +94,9 @@ def find_pairs(
     -------
     Samples as from `szlib.find_encounters`: one `encounter` is one pair, sampled at 10 Hz wherever it is
     within `r_max`. The reference pedestrian is the one with the smaller id. Further columns: kind, and third,
-    the number of other people within `r_max` of one of the two when they are nearest.
+    the number of other people within `r_max` of the reference pedestrian or of the other person, whichever is
+    larger, at the whole second next to their nearest approach. It is one too small if the two are farther
+    apart than `r_max` at that second.
 
     Raises
     ------
@@ -122,7 +128,7 @@ class Meetings:
     rows : of each pair the rows of the two people where they are nearest, (2, n).
     nearest : nearest approach [m], (n,).
     kind : number of the kind, (n,).
-    third : other people near one of the two at that moment, (n,).
+    third : other people near one of the two, as in `find_pairs`, (n,).
     near, of_pair : rows of `Crowd.coarse_rows` at every whole second at which two people may be near, (2, m),
         and their pair, (m,).
     """
@@ -219,8 +225,11 @@ class Crowd:
         velocity = np.where(self.inside, rows.velocity, np.nan)
         velocity = rows.around(velocity, passing, np.array([-BEFORE, BEFORE]))
         velocity = velocity[:, np.isfinite(velocity).all(axis=(0, 2))]
-        exchanged = count_exchanged(velocity[..., 0], velocity[..., 1])
-        return SensorCheck(**found, passes=velocity.shape[1], exchanged=exchanged)
+        return SensorCheck(
+            **found,
+            passes=velocity.shape[1],
+            exchanged=count_exchanged(velocity[..., 0], velocity[..., 1]),
+        )
 
     def meet(self, r_max: float, shifts: np.ndarray | None = None) -> Meetings:
         """Find the pairs of people within `r_max` [m].
@@ -236,7 +245,7 @@ class Crowd:
             second = (second + shifts[group]) % period[rows.day]
         moment = rows.day * period.max() + second
         found = find_neighbours(rows.place, moment, r_max + _MARGIN)
-        pairs = np.concatenate(list(found), axis=1)
+        pairs = np.hstack(list(found))
         pairs = pairs[:, np.diff(group[pairs], axis=0)[0] != 0]
         # A person who has just come into the area may have been nearer almost a second ago.
         pairs = pairs[:, rows.approach(pairs, -1.0, 1.0) < r_max + _TURN]
@@ -305,7 +314,10 @@ class Crowd:
     def _third_people(
         self, near: np.ndarray, at: np.ndarray, r_max: float
     ) -> np.ndarray:
-        """Number of other people within `r_max` [m] of one of two who are in the rows `at` of `near`."""
+        """The column third of `find_pairs`, of two people each in the rows `at` of `near`.
+
+        With shifts, people of the same stream do not count.
+        """
         close = near[:, self.coarse_rows.distance(*near) < r_max]
         around = np.bincount(close.ravel(), minlength=len(self.coarse_rows))
         return np.asarray(np.maximum(around[near[:, at]].max(axis=0) - 1, 0))

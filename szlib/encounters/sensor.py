@@ -159,7 +159,7 @@ def count_ends(
         resolved = max(
             resolved, _find_excess(distance[lost & is_end], distance[lost], _REACH)
         )
-    low, high = _interval_of_share(int((ends < NEAR_END).sum()), len(ends))
+    low, high = _interval_of_share((ends < NEAR_END).sum(), len(ends))
     return {
         "ends": len(ends),
         "samples": len(samples),
@@ -201,7 +201,8 @@ def measure_noise(rows: TrackRows, inside: np.ndarray) -> dict[str, Any]:
     errors = np.sqrt(of_person["mean"][is_measured])
     if len(errors) <= _FEWEST:
         return {}
-    low, high = quantile_test(errors, p=0.5).confidence_interval(0.95)
+    # of the median, 95 %
+    low, high = quantile_test(errors).confidence_interval()
     return {"noise": float(errors.median()), "noise_low": low, "noise_high": high}
 
 

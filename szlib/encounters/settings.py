@@ -66,9 +66,9 @@ class EncounterSettings:
     has_walls: bool = False
 
     def __post_init__(self) -> None:
-        automatic = str(self.area).strip() == AUTO
         if self.area is not None:
-            object.__setattr__(self, "area", AUTO if automatic else as_area(self.area))
+            area = AUTO if str(self.area).strip() == AUTO else as_area(self.area)
+            object.__setattr__(self, "area", area)
         duration = self.duration
         require(
             0 < duration < _LONGEST_WINDOW
@@ -102,7 +102,7 @@ class EncounterSettings:
             "area" if name == "square" else name: value
             for name, value in parameters.items()
         }
-        unknown = sorted(given.keys() - set(known))
+        unknown = sorted(given.keys() - known)
         if unknown:
             raise DataError(f"unknown parameter {unknown}; expected some of {known}")
         if len(given) < len(parameters):

@@ -67,7 +67,8 @@ class Ellipse:
             )
         if not a >= b > 0:
             raise ZoneError(f"semi-axes must satisfy a >= b > 0; got a = {a}, b = {b}")
-        angle = float(np.pi / 2 - (np.pi / 2 - self.angle) % np.pi)
+        # A remainder can be rounded up to the whole half turn, so it is taken twice.
+        angle = float(pi / 2 - (pi / 2 - self.angle) % pi % pi)
         object.__setattr__(self, "center", (x, y))
         object.__setattr__(self, "semi_axes", (a, b))
         object.__setattr__(self, "angle", angle)

@@ -189,9 +189,12 @@ def _enclose(
         active = [*support, farthest]
         weights = np.append(weights, 0.0)
     axes, semi_axes, _ = np.linalg.svd(np.sqrt(2) * frame @ root[1:, 1:])
-    center = origin + frame @ root[1:, 0]
-    angle = np.arctan2(axes[1, 0], axes[0, 0])
-    ellipse = Ellipse(tuple(center), tuple(semi_axes), angle, points[support])
+    ellipse = Ellipse(
+        tuple(origin + frame @ root[1:, 0]),
+        tuple(semi_axes),
+        np.arctan2(axes[1, 0], axes[0, 0]),
+        points[support],
+    )
     return _scale_to_contain(ellipse, points), support
 
 

@@ -242,12 +242,6 @@ class HullEstimator(Estimator):
         near = complementary_points(inliers, r_max=r_max)
         points = np.column_stack([near, inliers["speed"].to_numpy(float)])
         n_vertices = len(hull_vertices(points))
-        stage = funnels.stage(
-            "hull",
-            len(points),
-            n_vertices,
-            {"inside the hull": len(points) - n_vertices},
-        )
         number, encounters = encounter_numbers(inliers)
         return cls(
             points=points,
@@ -255,7 +249,15 @@ class HullEstimator(Estimator):
             r_max=r_max,
             encounters=encounters,
             parameters=options,
-            funnel=[*funnels.get(inliers), stage],
+            funnel=[
+                *funnels.get(inliers),
+                funnels.stage(
+                    "hull",
+                    len(points),
+                    n_vertices,
+                    {"inside the hull": len(points) - n_vertices},
+                ),
+            ],
         )
 
     def fit_shape(self, speeds: Sequence[float]) -> HullZone:

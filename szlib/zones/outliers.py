@@ -62,8 +62,12 @@ def complementary_points(samples: pd.DataFrame, *, r_max: float = R_MAX) -> Arra
     check_columns(samples, columns)
     angle, distance = samples[columns].to_numpy(float).T
     is_valid = np.isfinite(angle) & (distance >= 0) & (distance <= r_max)
-    expected = f"expected 0 <= distance <= r_max = {r_max} m and a finite los_angle"
-    check_rows(samples, is_valid, columns, expected)
+    check_rows(
+        samples,
+        is_valid,
+        columns,
+        f"expected 0 <= distance <= r_max = {r_max} m and a finite los_angle",
+    )
     return (r_max - distance)[:, None] * unit_vectors(angle)
 
 
@@ -96,8 +100,9 @@ def pair_numbers(samples: pd.DataFrame) -> NDArray[np.intp]:
     """The number of the pair of people of each of `samples` (n,), on each day, whoever is the reference."""
     people = pd.DataFrame(np.sort(samples[["ref_id", "other_id"]].to_numpy(), axis=1))
     day = np.asarray(samples.get("day", np.zeros(len(samples))))
-    groups = people.groupby([day, 0, 1], observed=True, dropna=False)
-    return np.asarray(groups.ngroup(), np.intp)
+    return np.asarray(
+        people.groupby([day, 0, 1], observed=True, dropna=False).ngroup(), np.intp
+    )
 
 
 def nearest_approaches(samples: pd.DataFrame) -> pd.DataFrame:
@@ -280,10 +285,12 @@ def remove_outliers(
         r_max=r_max,
         n_neighbours=n_neighbours,
     )
-    reason = (
-        "outlier (LOF)" if fraction is not None else "of an outlying encounter (LOF)"
+    return funnels.select(
+        close,
+        ~outlier,
+        "samples: inliers",
+        "outlier (LOF)" if fraction is not None else "of an outlying encounter (LOF)",
     )
-    return funnels.select(close, ~outlier, "samples: inliers", reason)
 
 
 def _find_far(places: Array, n_neighbours: int | None) -> NDArray[np.bool_]:

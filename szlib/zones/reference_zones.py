@@ -55,9 +55,10 @@ def reference_zone(name: str) -> ReferenceZone:
 
     Parameters
     ----------
-    name : "atc-strangers" (a day of the ATC mall, Osaka: a circle, because too few people met for more),
-        "grand-central-strangers" (Grand Central, New York), "atc-paper" and "atc-paper-strangers" (that ATC
-        day by the paper's method, all and strangers), or "hall" (a circle: Hall's personal distance).
+    name : "atc-strangers" (a day of the ATC mall, Osaka: undecided, because its tracker loses people near
+        each other), "grand-central-strangers" (Grand Central, New York), "atc-paper" and
+        "atc-paper-strangers" (that ATC day by the paper's method, all and strangers), or "hall" (a circle:
+        Hall's personal distance).
 
     Raises
     ------

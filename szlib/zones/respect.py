@@ -118,17 +118,22 @@ class RespectEstimator(Estimator):
         against = null.samples[null.samples["distance"] < r_max]
         if "kind" in close and "kind" in against:
             kinds = {*_KINDS} & {*close["kind"]} & {*against["kind"]}
-            is_compared = close["kind"].isin(kinds)
-            reason = "of a kind that is not compared (same direction, companions), or not in the null model"
             close = funnels.select(
-                close, is_compared, "samples: kinds compared", reason
+                close,
+                close["kind"].isin(kinds),
+                "samples: kinds compared",
+                "of a kind that is not compared (same direction, companions), or not in the null model",
             )
             against = against[against["kind"].isin(kinds)]
         rng = np.random.default_rng(0)
         is_drawn = _draw(close["encounter"], _DRAWN, rng)
         if not is_drawn.all():
-            reason = f"of more than {_DRAWN:,} encounters, some at random"
-            close = funnels.select(close, is_drawn, "samples: drawn", reason)
+            close = funnels.select(
+                close,
+                is_drawn,
+                "samples: drawn",
+                f"of more than {_DRAWN:,} encounters, some at random",
+            )
         n, n_null = (each["encounter"].nunique() for each in (close, against))
         against = against[_draw(against["encounter"], _DRAWN, rng)]
         if not (n and n_null):

@@ -286,9 +286,10 @@ class Likelihood:
     @cached_property
     def kinds(self) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
         """For each kind of encounter, whether each of the data and of the null model is of it."""
-        kind = self.data.kind
-        null_kind = self.null.kind
-        return [(kind == each, null_kind == each) for each in np.unique(kind)]
+        return [
+            (self.data.kind == each, self.null.kind == each)
+            for each in np.unique(self.data.kind)
+        ]
 
     def log_ratio(self, p: Array, h: Array, h_null: Array) -> float:
         """Log likelihood ratio of the parameters `p` against no zone.
@@ -303,9 +304,8 @@ class Likelihood:
 
     def log_posterior(self, p: Array) -> float:
         """Logarithm of the posterior density of the parameters `p`; 0 without a zone."""
-        h = self.data.distances(p)
-        h_null = self.null.distances(p)
-        return self.log_ratio(p, h, h_null) - _minus_log_prior(p)[0]
+        ratio = self.log_ratio(p, self.data.distances(p), self.null.distances(p))
+        return ratio - _minus_log_prior(p)[0]
 
     def cost(self, p: Array) -> tuple[float, Array]:
         """Minus the logarithm of the posterior density of the parameters `p`, and its gradient."""
@@ -330,11 +330,16 @@ class Likelihood:
 
     def maximise(self, starts: Sequence[Array]) -> Array:
         """The best parameters found from several `starts`."""
-        bounds = Bounds(_LOW, _HIGH)
         # several threads take ten times as long for small products
         with threads().limit(limits=1):
             tries = [
-                minimize(self.cost, p, jac=True, method="L-BFGS-B", bounds=bounds)
+                minimize(
+                    self.cost,
+                    p,
+                    jac=True,
+                    method="L-BFGS-B",
+                    bounds=Bounds(_LOW, _HIGH),
+                )
                 for p in starts
             ]
         return np.asarray(min(tries, key=lambda found: found.fun).x)

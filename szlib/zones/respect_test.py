@@ -55,10 +55,10 @@ from ..encounters.null_model import NullEncounters
 from ..encounters.sensor import SensorCheck
 from .outliers import R_MAX, nearest_approaches, smooth_paths
 from .respect_likelihood import EXCESS_PRIOR, respect_factor
+from .verdict import MIN_SHIFTS, NO_RESPECT, SIGNIFICANCE
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
-SIGNIFICANCE_LEVEL = 0.05
 _NULL_DRAWS = 5  # shifts that are fitted as if they were data
 # A kind that is expected more often than this and is missing was filtered out on one side only.
 _MIN_EXPECTED = 30
@@ -170,7 +170,8 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
         for real, null in strata:
             expected = (null + 1e-3 * m / _N_BINS) * is_seen
             total = g @ expected
-            likelihood += np.log(g) @ real
+            # An empty bin of the data counts nothing, even where g is 0 (0 log 0 would be NaN).
+            likelihood += np.log(g + 1e-300) @ real
             likelihood -= real.sum() * np.log(total / expected.sum())
             careless += share[:, 0] * ((1 - edge) @ expected) / total * real.sum() / n
         found.append((likelihood, careless))
@@ -179,11 +180,10 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
     is_zone = _IGNORING < 0.5
     every = np.broadcast_to(radii[:, None, None] * is_zone, likelihood.shape)
     best = likelihood.argmax()
-    least = every[is_likely].min()
     at = every.flat[best]
-    most = every[is_likely].max()
-    low = min(least, max(at - _MODEL_ERROR, 0.0))
-    high = max(most, at + _MODEL_ERROR)
+    likely = every[is_likely]
+    low = min(likely.min(), max(at - _MODEL_ERROR, 0.0))
+    high = max(likely.max(), at + _MODEL_ERROR)
     radius, low, high = np.round([at, low, high], 2).tolist()
     return RespectRadius(
         radius,
@@ -231,7 +231,7 @@ class NullTest:
     >>> result.is_significant
     False
     >>> print(result)
-    no respect shown (p = 0.25, 3 shifts, 50 encounters)
+    too few shifts to tell (p = 0.25, 3 shifts, 50 encounters)
     """
 
     p_value: float
@@ -252,11 +252,14 @@ class NullTest:
     @property
     def is_significant(self) -> bool:
         """Whether the data shows respect: p <= 0.05."""
-        return self.p_value <= SIGNIFICANCE_LEVEL
+        return self.p_value <= SIGNIFICANCE
 
     def __str__(self) -> str:
+        finding = "people avoid each other" if self.is_significant else NO_RESPECT
+        if self.n_shifts < MIN_SHIFTS:
+            finding = "too few shifts to tell"
         return (
-            f"{'people avoid each other' if self.is_significant else 'no respect shown'} "
+            f"{finding} "
             f"(p = {self.p_value:.2g}, {self.n_shifts} shifts, {self.n_encounters:,} encounters)"
         )
 

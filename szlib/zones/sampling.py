@@ -120,8 +120,9 @@ def sample(
         proposals.append((weight @ values, covariance))
     share = (np.arange(_KEPT) + rng.uniform()) / _KEPT
     at = np.searchsorted(_weigh(log_weight).cumsum(), share)
-    kept = values[np.minimum(at, len(values) - 1)]
-    return Draws(kept, r_hat, n_effective, len(values))
+    return Draws(
+        values[np.minimum(at, len(values) - 1)], r_hat, n_effective, len(values)
+    )
 
 
 def _weigh(log_weight: Array) -> Array:

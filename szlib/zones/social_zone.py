@@ -173,8 +173,9 @@ class SocialZone:
         tracks : a track table as from `szlib.read_tracks`.
         area : as in `szlib.find_pairs`.
         kinds : of pairs, as for `szlib.of_kind`, among those who come towards each other or cross.
-        r_max, seed : distance within which people count [m], and seed of shifts and intervals.
-        shifts, progress : as in `szlib.null_pairs`.
+        r_max, seed : distance within which people count [m], and seed of the shifts, and of the resampling as
+            in `fit`.
+        shifts, progress : as in `szlib.null_pairs`. A verdict needs at least 19 shifts.
         options : further ones of `fit`.
 
         Raises
@@ -231,9 +232,9 @@ class SocialZone:
         speeds : speeds of the zones [m/s].
         null : the null model, from `szlib.null_pairs` for pairs, or `szlib.null_encounters` for lone
             encounters. "respect" needs it; with any method, the data is tested against it (`null_test`).
-        n_resamples : number of zones estimated again, or drawn from the posterior, for the intervals; 0: no
-            intervals.
-        seed : of the resampling.
+        n_resamples : number of zones estimated again for the intervals; 0: no intervals. "respect" draws from
+            its posterior until the draws agree, so for it only 0 or not 0 matters.
+        seed : of the resampling. It does not change the intervals of "respect": its draws have a fixed seed.
         options : options of the method. "hull": `fraction` and `n_neighbours` as in `szlib.remove_outliers`.
             "paper", "respect": none.
 
@@ -271,8 +272,13 @@ class SocialZone:
         provenance = _describe_source(samples, estimator, method, r_max)
         test = None
         if null is not None:
-            farthest = f"at most the null model's {null.r_max} m"
-            require(r_max <= null.r_max, "r_max", r_max, farthest, ZoneError)
+            require(
+                r_max <= null.r_max,
+                "r_max",
+                r_max,
+                f"at most the null model's {null.r_max} m",
+                ZoneError,
+            )
             test = null_test(samples, null)
         sides = uncertainty = None
         if "encounter" in samples:
@@ -448,7 +454,8 @@ class SocialZone:
     def load(cls, path: str | Path) -> SocialZone:
         """Read a zone that `save` wrote to the file `path`.
 
-        Raises ZoneError if the file holds no zone, is damaged, or was written by another version of szlib.
+        Raises ZoneError if the file holds no zone, is damaged, was written by another version of szlib, or
+        its method is not in `METHODS`: the module that adds it must be imported before.
         """
         content = _read_content(Path(path))
         try:
@@ -560,6 +567,12 @@ def _read_content(path: Path) -> dict[str, Any]:
             f"{path}: the zone in it is damaged: its checksum is {expected!r}, which is not that of its "
             "content; do not edit zone files: fit and save the zone again"
         )
+    method = content.get("method")
+    if method not in [*METHODS]:
+        raise ZoneError(
+            f"{path}: its method {method!r} is unknown here; expected one of {', '.join(METHODS)}: "
+            "import the module that adds it to szlib.zones.social_zone.METHODS"
+        )
     return content
 
 
@@ -571,9 +584,9 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"])
         for e in content["ellipses"]
     }
-    counts, uncertainty, test = (
-        content[name] for name in ("side_counts", "uncertainty", "null_test")
-    )
+    counts = content["side_counts"]
+    uncertainty = content["uncertainty"]
+    test = content["null_test"]
     if uncertainty is not None:
         for name in ("intervals", "bands"):
             uncertainty[name] = _table(uncertainty[name])

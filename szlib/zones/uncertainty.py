@@ -74,7 +74,7 @@ class Uncertainty:
     Parameters
     ----------
     level : share of data sets whose interval contains the limit.
-    n_resamples : number of zones estimated again.
+    n_resamples : number of zones estimated again, or of draws from a posterior.
     unit : what is resampled: "pairs" of people, "encounters" if people have no ids, or "days".
     description : the method and its numbers.
     intervals : speed [m/s], quantity (one of `QUANTITIES`), low, high; NaN if too few resamples have a zone.
@@ -175,16 +175,15 @@ def estimate_uncertainty(
     ----------
     estimator : of the zone.
     ellipses : of the zone, by speed [m/s].
-    n_resamples : number of zones estimated again, at least 2.
-    seed : of the resampling.
+    n_resamples : number of zones estimated again, at least 2. A posterior has as many draws as it needs.
+    seed : of the resampling; the draws of a posterior have their own.
 
     Raises
     ------
     DataError : `n_resamples` is not a whole number of at least 2.
     """
-    is_count = isinstance(n_resamples, int | np.integer) and n_resamples >= 2
     require(
-        is_count,
+        isinstance(n_resamples, int | np.integer) and n_resamples >= 2,
         "n_resamples",
         n_resamples,
         "a whole number, 0 (no intervals) or at least 2",
@@ -193,13 +192,12 @@ def estimate_uncertainty(
     unit, member = resampling_units(estimator.encounters)
     n = member.max() + 1
     speeds = list(ellipses)
-    rows = [(*e.center, *e.semi_axes, e.angle) for e in ellipses.values()]
-    estimate = _quantities(np.array(rows))
+    estimate = _quantities(np.array([e.parameters for e in ellipses.values()]))
     posterior = estimator.posterior(speeds)
     if posterior is not None:
         description = f"posterior: {posterior}"
-        drawn = posterior.values
-        low, high = _find_percentiles(_quantities(drawn) - estimate)
+        n_resamples = posterior.n_evaluated
+        low, high = _find_percentiles(_quantities(posterior.values) - estimate)
         ends = np.stack([np.minimum(low, 0), np.maximum(high, 0)])
     elif estimator.is_extreme:
         size = max(1, round(SUBSAMPLE * n))

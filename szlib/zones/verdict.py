@@ -52,6 +52,7 @@ HIDDEN = 0.1
 # Fewest positions of a track (measured: plazas of which one position every 0.3 s is kept).
 FEWEST_POSITIONS = 12
 SIGNIFICANCE = 0.05
+MIN_SHIFTS = 19  # with fewer, p is above 0.05 whatever people do
 # Encounters within r_max from which on the test finds a core of 0.8 m in more than 90 % of crowds.
 MIN_TESTED = 60
 
@@ -102,7 +103,12 @@ def judge(zone: FittedZone, speed: float) -> Verdict:
     from ..tracks import funnels  # reads tracks, which a robot does not
 
     test = zone.null_test
-    if test is not None and not test.is_significant and test.n_encounters >= MIN_TESTED:
+    if (
+        test is not None
+        and not test.is_significant
+        and test.n_encounters >= MIN_TESTED
+        and test.n_shifts >= MIN_SHIFTS
+    ):
         return Verdict(
             NO_RESPECT,
             [
@@ -147,7 +153,10 @@ def _null_model(zone: FittedZone) -> Iterator[str]:
         yield "no null model: fit the zone with SocialZone.from_tracks(tracks)"
         return
     if not test.is_significant:
-        yield f"{test}, and {MIN_TESTED} encounters within {zone.r_max:g} m are needed to tell"
+        yield (
+            f"{test}: at least {MIN_TESTED} encounters within {zone.r_max:g} m, and {MIN_SHIFTS} shifts, are "
+            "needed to tell"
+        )
     limit = zone.provenance.get("parameters", {}).get("q", MOST_CARELESS)
     if test.respect.careless_high >= limit:
         yield (

@@ -146,6 +146,16 @@ def test_an_excluded_day_that_does_not_exist_is_named(days, tmp_path):
     with pytest.warns(szlib.DataWarning, match="hall: excluded, but there is no such"):
         found = extract(days[:1], tmp_path, exclude=["hall"])
     assert list(found.table["status"]) == ["done"]
+    with pytest.warns(szlib.DataWarning, match="hall: excluded, but there is no such"):
+        szlib.Extraction.load(tmp_path, exclude="hall")
+
+
+def test_one_excluded_day_or_several_are_left_out_when_days_are_loaded(days, tmp_path):
+    extract(days[:2], tmp_path)
+    for exclude in (DATES[0], [DATES[0]]):
+        loaded = szlib.Extraction.load(tmp_path, exclude=exclude)
+        assert list(loaded.sources) == [DATES[1]]
+        assert set(loaded.samples()["day"]) == {DATES[1]}
 
 
 def test_a_result_that_cannot_be_removed_does_not_stop_the_other_days(

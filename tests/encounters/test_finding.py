@@ -522,7 +522,8 @@ def test_wrap_angle_keeps_the_direction():
     wrapped = wrap_angle(angles)
     np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * angles), atol=1e-12)
     assert ((wrapped > -np.pi) & (wrapped <= np.pi)).all()
-    np.testing.assert_array_equal(wrap_angle(np.array([np.pi, -np.pi])), np.pi)
+    ends = np.array([np.pi, -np.pi, np.nextafter(np.pi, 4)])
+    np.testing.assert_array_equal(wrap_angle(ends), np.pi)
 
 
 # --- the reference frame -----------------------------------------------------------------------------

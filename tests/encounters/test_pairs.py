@@ -80,6 +80,19 @@ def test_samples_are_what_both_people_see():
     assert (pairs["third"] == 0).all()
 
 
+def test_people_seen_between_two_whole_seconds_only_are_no_pair():
+    walks = [
+        make_walk((0, 0.5 * k), (1, 0), person=k, begin=0.1, duration=0.8)
+        for k in range(2)
+    ]
+    tracks = make_tracks(*walks)
+    tracks.attrs["area"] = PLACE
+    assert szlib.find_pairs(tracks, kinds=None).empty
+    for find in (szlib.time_shifted, szlib.null_pairs, szlib.null_encounters):
+        with pytest.raises(DataError, match="too short for a null model"):
+            find(tracks)
+
+
 def test_third_people_are_counted_and_filter_nobody():
     walks = [make_walk((-5, 0), (1, 0), person=1, duration=10)]
     walks += [

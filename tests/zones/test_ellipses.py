@@ -141,7 +141,9 @@ def test_placed_ellipse_is_the_curve_turned_and_moved(ellipse, heading):
     assert placed.semi_axes == ellipse.semi_axes
 
 
-@pytest.mark.parametrize("angle", np.linspace(-10, 10, 41))
+@pytest.mark.parametrize(
+    "angle", [*np.linspace(-10, 10, 41), np.nextafter(np.pi / 2, 2)]
+)
 def test_angle_is_normalised_to_half_a_turn(angle):
     ellipse, turned = (Ellipse((1, 2), (2, 1), angle + turn) for turn in (0, 3 * np.pi))
     assert -np.pi / 2 < ellipse.angle <= np.pi / 2

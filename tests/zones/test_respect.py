@@ -275,7 +275,7 @@ def test_the_posterior_has_the_curvature_of_its_density(
 def test_intervals_are_those_of_the_posterior(estimator):
     ellipses = estimator.fit_shape([0.9, 1.1]).ellipses
     found = estimate_uncertainty(estimator, ellipses, n_resamples=300, seed=0)
-    assert found.description.startswith("posterior: ")
+    assert found.description.startswith(f"posterior: {found.n_resamples} draws, ")
     assert "R-hat 1.0" in found.description and found.has_converged
     at = found.intervals[found.intervals["speed"] == 1.1].set_index("quantity")
     for name, truth in {"a": 0.95, "b": 0.7, "center_x": 0.1, "center_y": 0.0}.items():

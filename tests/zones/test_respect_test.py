@@ -8,7 +8,7 @@ from studies.noninteracting_crowd import noninteracting_crowd
 import szlib
 from szlib.core.errors import DataError, DataWarning, ZoneError
 from szlib.zones import respect_test
-from szlib.zones.respect_test import collect_approaches, null_test
+from szlib.zones.respect_test import collect_approaches, fit_radius, null_test
 
 KINDS = ("opposite", "crossing")
 SHIFTS = 39
@@ -132,6 +132,18 @@ def test_people_who_keep_away_show_respect():
     assert test.is_significant
     assert test.respect.radius == pytest.approx(0.5, abs=0.15)
     assert "people avoid each other (p = 0.025, 39 shifts" in str(test)
+
+
+def test_the_radius_is_the_same_where_people_count_up_to_5_m():
+    rng = np.random.default_rng(0)
+    nearest = 5 * np.sqrt(rng.uniform(size=(10, 2000)))
+    shift = np.arange(10).repeat(2000)
+    approaches = pd.DataFrame({"nearest": nearest.ravel(), "shift": shift, "kind": 0})
+    approaches = approaches[(approaches["nearest"] > 0.8) | (approaches["shift"] > 0)]
+    near = approaches[approaches["nearest"] < 2]
+    assert fit_radius(approaches, 5.0).radius == pytest.approx(
+        fit_radius(near, 2.0).radius, abs=0.05
+    )
 
 
 def test_people_who_come_near_show_no_respect():

@@ -13,7 +13,8 @@ from helpers.passing_pairs import null_of, passing_pairs, respecting
 
 import szlib
 from szlib.tracks import funnels
-from szlib.zones.social_zone import SPEEDS, SocialZone
+from szlib.zones.ellipses import EllipseZone
+from szlib.zones.social_zone import METHODS, SPEEDS, SocialZone
 
 ANGLES = np.linspace(-np.pi, np.pi, 180, endpoint=False)
 SAGITTA = 2.0 * (1 - np.cos(np.pi / len(ANGLES)))
@@ -400,6 +401,18 @@ def test_damaged_file_is_refused_by_name(zone, tmp_path, change, message):
         SocialZone.load(path)
 
 
+def test_a_zone_of_an_unknown_method_names_it(zone, tmp_path, monkeypatch):
+    path = tmp_path / "zone.json"
+    with monkeypatch.context() as program:
+        program.setitem(METHODS, "own", METHODS["respect"])
+        shape = EllipseZone(zone.ellipses)
+        replace(zone, method="own", shape=shape).save(path)
+        assert SocialZone.load(path).method == "own"
+    message = r"zone\.json: its method 'own' is unknown here; .*import the module"
+    with pytest.raises(szlib.ZoneError, match=message):
+        SocialZone.load(path)
+
+
 def test_missing_file_is_refused(tmp_path):
     for path in (tmp_path / "missing.json", tmp_path):
         with pytest.raises(
@@ -574,7 +587,6 @@ def test_speed_without_encounters_is_not_adequate(zone):
         (lambda c: c.update(hull_vertices=[[0, 0, 0]] * 9), "lie in one plane"),
         (lambda c: c.update(hull_vertices=[[0, 0, 0], [1]]), "is damaged"),
         (lambda c: c.update(hull_vertices=None), "EllipseZone is not the shape"),
-        (lambda c: c.update(method="guess"), "one of paper, hull"),
         (lambda c: c.update(method="respect"), "HullZone is not the shape"),
         (lambda c: c.update(provenance=3), "is damaged"),
     ],

@@ -84,6 +84,24 @@ def test_people_who_ignore_each_other_show_no_respect(method):
     assert "as near as people who ignore each other" in verdict.reasons[0]
 
 
+def test_fewer_than_19_shifts_decide_nothing(careful):
+    few, enough = (
+        replace(
+            careful.null_test,
+            p_value=1 / (1 + n),
+            null_statistics=careful.null_test.null_statistics[:n],
+        )
+        for n in (18, 19)
+    )
+    verdict = replace(careful, null_test=few).verdict(SPEED)
+    assert verdict == "undecided"
+    assert "too few shifts to tell (p = 0.053, 18 shifts" in verdict.reasons[0]
+    assert "19 shifts, are needed" in verdict.reasons[0]
+    assert replace(careful, null_test=enough).verdict(SPEED) == "usable"
+    ignoring = replace(careful, null_test=replace(enough, p_value=0.1))
+    assert ignoring.verdict(SPEED) == "no respect shown"
+
+
 def fit_quietly(samples, **options):
     """As `fit`; a method may find no zone at all, which is as good an answer."""
     try:
