@@ -60,7 +60,8 @@ from .problem import (
 )
 from .settings import TOLERANCE, MPCSettings
 
-# The iterations end if the change of the inputs is smaller, as a vector [m/s2].
+# The iterations end if the change of the inputs is smaller, as a vector [m/s2], and that of no velocity is
+# larger [m/s].
 CONVERGED = 1e-3
 # Price of a metre of decay without `decay_price`, in the unit of the scaled cost: above every multiplier.
 HARD_PRICE = 1e5
@@ -191,7 +192,7 @@ class Program:
         of_level = np.array([0.0, 0.0, zone_price, s.decay_price])
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
         self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
-        self._is_hard = s.decay_price >= HARD_PRICE
+        self._is_hard = s.decay_price == inf
         self._sense = np.where(self.prices > 0, _SOFT, np.intc(_HARD))
         self._sense[3 * s.N : self.first] = _EQUAL
         self._models = dict[Any, Any]()
@@ -419,7 +420,9 @@ class Planner:
         s = self.settings
         is_relaxed = is_converged = timed_out = False
         program.inputs[:], program.multipliers[:] = guess, self._on_speed
-        before: Array | None = None
+        before = np.zeros(guess.size)
+        # then the squared speed is off by no more than `TOLERANCE`, however long the steps are
+        smallest = CONVERGED / max(1.0, hypot(*np.diff(s.times)))
         for _ in range(s.max_iterations):
             program.evaluate()
             solved = program.solve()
@@ -428,11 +431,11 @@ class Planner:
                 timed_out = self.is_late
                 return Plan(program.inputs.copy(), inf, (inf,), True, timed_out)
             step, is_relaxed = solved
-            if before is not None and step @ before < -(before @ before) / 2:
+            if step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever
             before = step
             program.inputs += step.reshape(-1, 2)
-            is_converged = hypot(*step.tolist()) <= CONVERGED
+            is_converged = hypot(*step.tolist()) <= smallest
             timed_out = not is_converged and self.is_late
             if is_converged or timed_out:
                 break
