@@ -60,8 +60,7 @@ from .problem import (
 )
 from .settings import TOLERANCE, MPCSettings
 
-# The iterations end if the change of the inputs is smaller, as a vector [m/s2], and that of no velocity is
-# larger [m/s].
+# The iterations end if the change of the inputs is smaller, as a vector [m/s2].
 CONVERGED = 1e-3
 # Price of a metre of decay without `decay_price`, in the unit of the scaled cost: above every multiplier.
 HARD_PRICE = 1e5
@@ -418,31 +417,30 @@ class Planner:
     def _plan(self, question: Question, guess: Array, has_floors: bool) -> Plan:
         program = self.prepare(question, has_floors)
         s = self.settings
-        is_relaxed = is_converged = timed_out = False
         program.inputs[:], program.multipliers[:] = guess, self._on_speed
         before = np.zeros(guess.size)
-        # then the squared speed is off by no more than `TOLERANCE`, however long the steps are
-        smallest = CONVERGED / max(1.0, hypot(*np.diff(s.times)))
         for _ in range(s.max_iterations):
             program.evaluate()
             solved = program.solve()
             if solved is None:
                 self._on_speed[:] = 0.0
-                timed_out = self.is_late
-                return Plan(program.inputs.copy(), inf, (inf,), True, timed_out)
+                return Plan(program.inputs.copy(), inf, (inf,), True, self.is_late)
             step, is_relaxed = solved
             if step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever
             before = step
             program.inputs += step.reshape(-1, 2)
-            is_converged = hypot(*step.tolist()) <= smallest
+            is_converged = hypot(*step.tolist()) <= CONVERGED
             timed_out = not is_converged and self.is_late
             if is_converged or timed_out:
                 break
         self._on_speed[:] = program.multipliers
-        inputs = np.minimum(np.maximum(program.inputs, -s.a_max), s.a_max)
+        inputs = program.inputs.clip(-s.a_max, s.a_max)
+        states = build_horizon(s).states(np.array(question.state), inputs)
+        speeds = np.hypot(*states[:, 2:].T).clip(s.v_max)
+        # the last change of long steps may leave it too fast
+        is_converged &= bool(speeds.max() ** 2 - speeds[0] ** 2 <= TOLERANCE)
         if not is_converged:
-            states = build_horizon(s).states(np.array(question.state), inputs)
             inputs = follow_velocities(s, question.state[2:], states[1:, 2:])
         program.inputs[:] = inputs
         if is_relaxed or not is_converged:

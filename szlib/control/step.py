@@ -347,10 +347,10 @@ class Step:
             lines.append(f"  way: {self.way}")
             lines += [f"  not: {self._explain_other(way)}" for way in self.ways[1:]]
         if not self.feasible:
-            lines.append(
-                f"  the plan violates {report.worst.name} by {report.slack:.2g}"
-            )
-            lines.append(f"  what helps: {self._advise(report.worst)}")
+            lines += [
+                f"  the plan violates {report.worst.name} by {report.slack:.2g}",
+                f"  what helps: {self._advise(report.worst)}",
+            ]
         lines += self._list_notes()
         return "\n".join(lines + [f"  WRONG: {fault}" for fault in report.faults])
 

@@ -340,8 +340,7 @@ class WayFinder:
         """A new map that holds these `points`, with this `slack`."""
         self._standing = None
         self._steps = 0
-        clearance = self._s.r_robot + self._s.eps
-        return Map(self._fixed, points, clearance, slack)
+        return Map(self._fixed, points, self._s.r_robot + self._s.eps, slack)
 
     def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
         """Find the ways anew, and choose one."""
