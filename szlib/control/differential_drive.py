@@ -34,7 +34,7 @@ By both lines (v dt)^2 = (D^2 - 4 L^2 sin^2 beta) beta^2 / sin^2 beta <= D^2, fo
 point has the margin r'^2 / l to a wall of length l. Write the paper's distance to it as d = s + s^2 / l.
 With t its trimming term, 0 <= t <= d, |grad d|^2 = 1 + 4 t / l, and ds/dd is (1 + 4 d / l)^(-1/2): s changes
 by no more than the way either. h >= 0 at p says s >= r' there, so s >= r + eps at c, which is h >= 0. So
-*the disc has h >= 0 after every step that said it was safe*, where people keep their velocity. In between,
+*the disc has h >= 0 after every step that said it was safe*, where people do as predicted. In between,
 the chord of p, seen by a person at the relative speed u, cuts at most (u dt)^2 / 8 r' off their zone (4 mm
 at 1.5 m/s), as it does for any robot: eps is for that.
 

@@ -35,6 +35,10 @@ the barrier rows of the steps that both plans share. The new row is
 h(x_N) - (1 - gamma) h(x_N) = gamma h(x_N), and the old rows give h(x_{k+1}) >= (1 - gamma) h(x_k), so
 h(x_N) >= (1 - gamma)^N h(x_0) >= 0: the new row holds as well. So a robot that starts in the safe set with
 a solution, at rest for instance (u = 0), has one for ever, and h >= 0 for ever.
+
+This is proved without the guard. With the guard, which is the default, a plan that curves beside a wall may
+be given up for braking, and then a barrier row may be violated: in 5 of 213 random worlds with people who
+stand, walls and gamma up to 0.3. With `guard=False` this happened in none of 59,360 steps in 742 worlds.
 """
 
 from __future__ import annotations
@@ -92,7 +96,7 @@ class MPCCBF(Controller):
 
     A controller belongs to the thread that first calls `step`; give each thread its own, for instance a copy.
     A copy (`copy.copy`, `copy.deepcopy`, `pickle`) gives the same steps as its original, bit for bit, unless
-    a time limit ends a step.
+    a time limit ends a step, or ids of people are compared by identity (`Tracker`).
 
     Parameters
     ----------
@@ -468,7 +472,7 @@ class MPCCBF(Controller):
         fixed = self._fixed if is_point else self._fixed_of_disc
         people = tracked.people
         zones = Obstacles((), s.r_robot)
-        found = tuple([self.zone_of(each) for each in people])
+        found = tuple(map(self.zone_of, people))
         if people:
             placed = [
                 Zone.place(zone, each.position, each.heading or 0.0, each.velocity)
@@ -477,7 +481,7 @@ class MPCCBF(Controller):
             numbers = np.array(placed)
             if [each for each in people if each.prediction]:
                 numbers = np.hstack([numbers, [list_knots(each, s) for each in people]])
-            offsets = np.array(len(people) * [s.r_robot + s.eps])
+            offsets = np.full(len(people), s.r_robot + s.eps)
             zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 

@@ -308,7 +308,7 @@ class Obstacle:
         return np.zeros(len(numbers))
 
     def __repr__(self) -> str:
-        return f"{self.kind} ({', '.join(f'{number:g}' for number in self.numbers)})"
+        return f"{self.kind} ({', '.join(f'{number:.9g}' for number in self.numbers)})"
 
 
 def _drift(t: Any, knots: Any) -> list[Any]:
@@ -750,7 +750,7 @@ class Obstacles(NamedTuple):
         found = [np.empty((0, *shape))]
         for kind, numbers, offsets in self.groups:
             values = getattr(kind, formula)(x, y, t, *numbers.T[axes])
-            found.append(values - offsets[axes] if is_barrier else values)
+            found.append(values - is_barrier * offsets[axes])
         return np.concatenate(found)
 
 

@@ -10,7 +10,7 @@ A sensor is noisy and late, and loses people. By the ids of people,
                 more than `memory` before or after now. The last known state of the same id takes their place,
                 moved forward; people without such a state are *unknown*
     late        measurements, older than what is known of the same id, are ignored
-    ids         that are NaN, or given to two people at once, tell nothing
+    ids         that are NaN or NA, or given to two people at once, tell nothing; others compare by value
     lost        people give their place to a person with a new id who is within `SAME_PLACE` of where they are
                 expected: a sensor that changes ids makes nobody appear twice
     the clock   may go back: that step is taken to be as long as the one before, and nobody is forgotten
@@ -208,8 +208,8 @@ class Person:
     zone : their social zone, in their own frame; None: the controller's.
     id : by which a `Tracker` recognises them; None: they are new at each step.
     heading_unknown : True if they are too slow for the velocity to give the heading: then it is `heading`.
-    prediction : where they will be; None: they keep their velocity. The problem and the ways use it. What a
-        step claims of bodies (`Step.passively_safe`) is about people who keep their velocity.
+    prediction : where they will be; None: they keep their velocity. The problem, the ways, `Step.safe` and
+        `Step.clearance` use it. `Step.passively_safe` is about people who keep their velocity.
     group : with whom they are together: a way between two of a group has a price. None: whoever is near and
         has a like velocity (`szlib.control.ways`).
 
@@ -250,8 +250,12 @@ class Person:
         vars(self).update(position=position, velocity=velocity, heading=heading)
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
-        is_name = isinstance(self.group, Hashable)
-        check_argument(is_name, "a group", self.group, "hashable, such as a number")
+        try:
+            hash(self.group)
+        except TypeError as error:
+            raise SolverError(
+                f"a group must be hashable, such as a number; got {self.group!r:.200}"
+            ) from error
         is_one = isinstance(self.prediction, Prediction | None)
         check_argument(is_one, "prediction", self.prediction, "a Prediction")
 
@@ -317,6 +321,9 @@ class TrackedPeople(NamedTuple):
 class Tracker:
     """Remembers people by their ids; see the top of this module.
 
+    Ids are compared by value: take numbers, texts or tuples of these. A copy of a tracker does not recognise
+    an id that is equal to nothing but itself, such as an object of a plain class.
+
     Parameters
     ----------
     walking_speed : speed from which on the velocity gives the heading [m/s] (assumed: ten times the noise of
@@ -343,13 +350,13 @@ class Tracker:
     def __init__(self, *, walking_speed: float = 0.2, memory: float = 1.0) -> None:
         self.walking_speed = check_finite("walking_speed", walking_speed, 0.0)
         self.memory = check_finite("memory", memory, 0.0)
-        self._last_seen: dict[Hashable, _LastSeen] = {}
-        self._now = inf
-        self._interval = 0.0
+        self.reset()
 
     def reset(self) -> None:
-        """Forget everybody."""
-        self._last_seen.clear()
+        """Forget everybody, and the time."""
+        self._last_seen = dict[Hashable, _LastSeen]()
+        self._now = inf
+        self._interval = 0.0
 
     def see(
         self,
@@ -380,7 +387,8 @@ class Tracker:
         rejected = 0
         unknown = 0
         for person, is_usable, name, time in measured:
-            if given[name] > 1 or name != name:  # NaN
+            # NaN is not equal to itself, and pandas' NA does not say
+            if given[name] > 1 or (name != name) not in {False}:
                 name = None
             last = self._last_seen.get(name)
             if is_usable and abs(now - time) <= self.memory:

@@ -191,7 +191,7 @@ class Program:
         of_level = np.array([0.0, 0.0, zone_price, s.decay_price])
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
         self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
-        self._is_hard = s.decay_price >= HARD_PRICE
+        self._is_hard = s.decay_price == inf
         self._sense = np.where(self.prices > 0, _SOFT, np.intc(_HARD))
         self._sense[3 * s.N : self.first] = _EQUAL
         self._models = dict[Any, Any]()
@@ -417,18 +417,16 @@ class Planner:
     def _plan(self, question: Question, guess: Array, has_floors: bool) -> Plan:
         program = self.prepare(question, has_floors)
         s = self.settings
-        is_relaxed = is_converged = timed_out = False
         program.inputs[:], program.multipliers[:] = guess, self._on_speed
-        before: Array | None = None
+        before = np.zeros(guess.size)
         for _ in range(s.max_iterations):
             program.evaluate()
             solved = program.solve()
             if solved is None:
                 self._on_speed[:] = 0.0
-                timed_out = self.is_late
-                return Plan(program.inputs.copy(), inf, (inf,), True, timed_out)
+                return Plan(program.inputs.copy(), inf, (inf,), True, self.is_late)
             step, is_relaxed = solved
-            if before is not None and step @ before < -(before @ before) / 2:
+            if step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever
             before = step
             program.inputs += step.reshape(-1, 2)
@@ -437,9 +435,12 @@ class Planner:
             if is_converged or timed_out:
                 break
         self._on_speed[:] = program.multipliers
-        inputs = np.minimum(np.maximum(program.inputs, -s.a_max), s.a_max)
+        inputs = program.inputs.clip(-s.a_max, s.a_max)
+        states = build_horizon(s).states(np.array(question.state), inputs)
+        speeds = np.hypot(*states[:, 2:].T).clip(s.v_max)
+        # the last change of long steps may leave it too fast
+        is_converged &= bool(speeds.max() ** 2 - speeds[0] ** 2 <= TOLERANCE)
         if not is_converged:
-            states = build_horizon(s).states(np.array(question.state), inputs)
             inputs = follow_velocities(s, question.state[2:], states[1:, 2:])
         program.inputs[:] = inputs
         if is_relaxed or not is_converged:

@@ -65,8 +65,11 @@ class MPCSettings:
     lookahead : the plan heads for the point of the way that lies at most this far ahead [m]: see
         `szlib.control.ways`. `inf`, as in the paper: no way is looked for, and the plan heads for the goal.
         On a large map a new goal takes some 0.1 s, at most some 0.5 s; 1 s if r_robot + eps is nearly 0.
-        Towards a goal that is 150 m away or more the map is coarse, and doors may be closed: give a nearer
-        one.
+        The cells of a square map have 1/500 of its side, and at least 0.06 m. For a robot with
+        r_robot + eps < 1.7 cells, a door narrower than 3 cells may be closed although it fits: narrower than
+        0.18 m on a map of 30 m, and than 0.45 m on one of 75 m. A map ends 35 m beyond robot and goal, at
+        the latest. Towards a goal that is 150 m away or more, wider doors may be closed: give a nearer one.
+        A door that leaves only some mm to spare may be closed, too.
     eps : margin [m], for instance for the error of the approximate distances; see `margin`.
     margin : around walls. "euclidean": eps, in Euclidean distance. By the paper's distance (eq. 3-5), which
         is greater beyond the ends: "paper": eps, which allows overlaps with the ends of walls shorter
@@ -80,6 +83,7 @@ class MPCSettings:
         in `szlib.control.mpc`.
     decay_price, zone_price : prices of a metre, and 0.1 s, of decay of h beyond gamma, and of h < 0 of a zone
         [cost per metre to the goal]. `inf`, as in the paper: violated only where no plan satisfies the row.
+        Finite prices above 1e5 count as 1e5.
         A way may always lead through a zone (`szlib.control.ways`). If both prices are finite, the plan
         follows it through zones of people who stand.
     body_gap : gap to the bodies of people that has priority over zones and decay [m].
@@ -211,11 +215,11 @@ class MPCSettings:
     def among_people(cls, **changes: Any) -> MPCSettings:
         """The controller that a robot should run among people, with `changes` by name.
 
-        It plans 30 `dt` ahead, 3 s, in 14 steps with barriers on each, takes a way around walls and between
-        people, to a point at most 1 m farther than it can come, and prefers a smooth ride. A decay of h
-        beyond gamma has a price, and a zone a high one, so that the robot passes where people leave it no
-        other way: see `Step.safe` and `Step.explain`. Distances to walls are Euclidean. Notebook 12 compares
-        it with the paper's controller.
+        It plans 30 `dt` ahead (3 s with the default dt), in 14 steps with barriers on each, takes a way
+        around walls and between people, to a point at most 1 m farther than it can come, and prefers a
+        smooth ride. A decay of h beyond gamma has a price, and a zone a high one, so that the robot passes
+        where people leave it no other way: see `Step.safe` and `Step.explain`. Distances to walls are
+        Euclidean. Notebook 12 compares it with the paper's controller.
 
         Examples
         --------
@@ -239,7 +243,7 @@ class MPCSettings:
         is_used = not (counts and changes.get("grid", True))
         check_argument(is_used, "N and N_h", changes, expected)
         chosen = cls(**own | changes)
-        farther = 1.0 + sum(own["grid"]) * chosen.dt * chosen.v_max
+        farther = 1.0 + chosen.times[-1] * chosen.v_max
         return replace(chosen, lookahead=changes.get("lookahead", farther))
 
     @cached_property

@@ -253,7 +253,8 @@ class Step:
         """True if the goal cannot be reached: h < 0 there, or no way leads there.
 
         A person slower than `people.STANDING_SPEED` counts as standing. The robot waits beside them; without
-        a way it goes to the nearest point that it can reach.
+        a way it goes to the nearest point that it can reach. Ways are looked for on a map of cells, on which
+        a narrow door may be closed for a small robot although it fits: see `MPCSettings.lookahead`.
         """
         return self.scene.goal_blocked or self.way_length == inf
 
@@ -271,21 +272,22 @@ class Step:
     def clearance(self) -> Array:
         """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and everything fixed [m].
 
-        Shape (obstacles, N+1): now, and at each state of the plan, with people who keep their velocity.
-        Negative is an overlap.
+        Shape (obstacles, N+1): now, and at each state of the plan, with people who move as predicted, else
+        keep their velocity. Negative is an overlap.
         """
         x, y, *_ = self.predicted.T
         return self.scene.barriers.gaps(x, y, self.scene.settings.times)
 
     @property
     def safe(self) -> bool:
-        """True if this step keeps the robot safe from walls, and from people who keep their velocity.
+        """True if this step keeps the robot safe from walls and people.
 
-        That is: no person is unknown (see `MPCCBF.step`); the plan satisfies every row without a price;
-        h >= 0 now and after the control; and the robot's disc overlaps no body and no wall, by Euclidean
-        distance, and enters no zone by more than eps, from now until after the control, between samples too.
-        People who turn, stop or speed up within a step may still cause h < 0 after a safe step; the next step
-        then says so. What holds beyond this step says `passively_safe`.
+        That is, if people move as predicted, else keep their velocity: no person is unknown (see
+        `MPCCBF.step`); the plan satisfies every row without a price; h >= 0 now and after the control; and
+        the robot's disc overlaps no body and no wall, by Euclidean distance, and enters no zone by more than
+        eps, from now until after the control, between samples too. People who turn, stop or speed up within a
+        step may still cause h < 0 after a safe step; the next step then says so. What holds beyond this step
+        says `passively_safe`.
         """
         return not self._find_danger()
 
@@ -309,9 +311,10 @@ class Step:
             return "its plan is not feasible"
         if (then < -TOLERANCE).any():
             return f"it comes too close to {scene.name(int(then.argmin()))}"
+        if not barriers.bound(path).is_safe:
+            return "its disc may overlap a body or a wall"
         h = scene.zones.bound(path, is_barrier=True).lower + scene.settings.eps
-        is_safe = min(barriers.bound(path).lower, h) >= -TOLERANCE
-        return "" if is_safe else "its disc overlaps a body or a wall"
+        return "" if h >= -TOLERANCE else "it may enter a zone on its way"
 
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, from that of the point which is planned for; here it is the same."""
@@ -344,10 +347,10 @@ class Step:
             lines.append(f"  way: {self.way}")
             lines += [f"  not: {self._explain_other(way)}" for way in self.ways[1:]]
         if not self.feasible:
-            lines.append(
-                f"  the plan violates {report.worst.name} by {report.slack:.2g}"
-            )
-            lines.append(f"  what helps: {self._advise(report.worst)}")
+            lines += [
+                f"  the plan violates {report.worst.name} by {report.slack:.2g}",
+                f"  what helps: {self._advise(report.worst)}",
+            ]
         lines += self._list_notes()
         return "\n".join(lines + [f"  WRONG: {fault}" for fault in report.faults])
 
@@ -366,10 +369,10 @@ class Step:
             "zone_price=inf": s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE,
             "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
-            "v_max": bool(scene.people) and not self.passively_safe,
+            "v_max": self.walls_safe and not self.passively_safe,
             f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one": self.timed_out,
             f"the goal {scene.goal} cannot be reached, h < 0 there, so the robot waits beside it; what "
-            "helps: another goal": self.scene.goal_blocked,
+            "helps: another goal": scene.goal_blocked,
             "there is no way to the goal, so the robot goes to the nearest point that it can reach; what "
             "helps: another goal": self.way_length == inf,
             f"{self.rejected} measurements of people were rejected; {self.unknown} are "
@@ -391,11 +394,10 @@ class Step:
         """How far the goal is, and what holds the robot: the barriers that are at their limit."""
         holding = np.flatnonzero(self.residual.min(axis=1, initial=inf) <= HOLDS)
         names = [self.scene.name(i) for i in holding.tolist()]
-        s = self.scene.settings
         return (
             f"{dist(self.scene.state[:2], self.scene.goal):.1f} m from the goal; held by "
             f"{' and '.join(names) or 'nothing'}; what helps: "
-            f"{'another goal' if s.decay_price < inf else 'among_people()'}"
+            f"{'another goal' if self.scene.settings.decay_price < inf else 'among_people()'}"
         )
 
     def _advise(self, row: Row) -> str:

@@ -340,8 +340,7 @@ class WayFinder:
         """A new map that holds these `points`, with this `slack`."""
         self._standing = None
         self._steps = 0
-        clearance = self._s.r_robot + self._s.eps
-        return Map(self._fixed, points, clearance, slack)
+        return Map(self._fixed, points, self._s.r_robot + self._s.eps, slack)
 
     def _search(self, m: Map, at: Point, goal: Point, near: Surroundings) -> None:
         """Find the ways anew, and choose one."""
@@ -508,7 +507,7 @@ class Surroundings:
         self.people = places
         self.places = np.concatenate([places, (places[i] + places[j]) / 2])
         self.around = np.concatenate([places, walls])
-        moved = np.hypot(*(self.places[:, -1] - self.places[:, 0]).T)
+        moved = np.hypot(*(self.places - self.places[:, :1]).T).max(axis=0)
         self.stands = moved < STANDING_SPEED * _TIMES[-1]
 
     def find_prices(
@@ -587,9 +586,9 @@ def _name(m: Map, way: Way, near: Surroundings, turns: Array) -> str:
     rest = np.diff(way.times)[moved == 0].sum()
     for number, places in enumerate(near.people):
         offsets = points - places
-        walk = (places[1] - places[0]) / _TICK
         gaps = np.hypot(*offsets.T)
         k = gaps.argmin()
+        walk = np.gradient(places, _TICK, axis=0)[k]
         turn = turns[number]
         if abs(turn) < pi / 2 or gaps[k] > _NAMED_WITHIN:
             continue

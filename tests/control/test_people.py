@@ -1,6 +1,7 @@
 """People as a sensor measures them: headings, changing ids, time stamps, hidden people, unusable numbers."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import szlib
@@ -111,7 +112,9 @@ def test_persons_without_id_are_used_unchanged():
 # ids that identify nobody
 
 
-@pytest.mark.parametrize("ids", [[np.nan], [float("nan")], [np.float64("nan")]])
+@pytest.mark.parametrize(
+    "ids", [[np.nan], [float("nan")], [np.float64("nan")], [pd.NA]]
+)
 def test_an_id_that_is_nan_is_no_id(ids):
     tracker = szlib.Tracker()
     for k in range(5):
@@ -486,6 +489,20 @@ def test_a_person_with_unusable_numbers_raises_an_error(arguments, message):
         szlib.Person(**arguments)
 
 
-def test_a_group_that_is_no_name_is_refused():
+@pytest.mark.parametrize("group", [[1], (1, [1])])
+def test_a_group_that_is_no_name_is_refused(group):
     with pytest.raises(szlib.SolverError, match=r"a group must be hashable.*\[1\]"):
-        szlib.Person((0.0, 0.0), group=[1])
+        szlib.Person((0.0, 0.0), group=group)
+
+
+def test_a_tracker_that_was_reset_is_as_a_new_one():
+    """The time between its steps is forgotten, too: a clock that goes back is taken to go on by it."""
+    found = []
+    for earlier in ((), (10.0, 10.5)):
+        tracker = szlib.Tracker()
+        for now in earlier:
+            tracker.see([], now=now)
+        tracker.reset()
+        tracker.see([[0.0, 0.0, 1.0, 0.0]], ids=["a"], now=0.0)
+        found.append(tracker.see([], ids=[], now=-5.0).people[0].position)
+    assert found[0] == found[1]

@@ -570,3 +570,25 @@ def test_a_deadline_counts_time_in_which_the_thread_does_not_run(
     step = szlib.MPCCBF(ZONE, settings=settings).step((-1.9, 0, 1, 0), GOAL, [FACING])
     assert step.timed_out == is_late
     assert ("time was up after 0.02 s" in step.explain()) == is_late
+
+
+@pytest.mark.parametrize("price", [100.0, 1e5, 1e6])
+def test_a_finite_price_buys_a_violation_however_high_it_is(price):
+    """The report and the planner agree on which rows have a price."""
+    controller = controller_of(decay_price=price, N_h=8)
+    person = szlib.Person((0.0, 0.0), (-0.5, 0.0))
+    step = controller.step((-2.8, 0.0, 1.0, 0.0), GOAL, [person])
+    assert step.violations[Priority.DECAY] > TOLERANCE
+    assert step.feasible and step.status == "optimal"
+
+
+def test_a_plan_of_long_steps_that_is_optimal_is_feasible():
+    """The last change of the inputs moves a velocity by no more than the square root of the tolerance."""
+    controller = controller_of(dt=0.5, grid=(1, 2, 4, 4, 4))
+    rng = np.random.default_rng(0)
+    starts = [(0.43624991, 4.35072424), *rng.uniform(-5, 5, (40, 2))]
+    goals = [(3.15853554, -4.972615), *rng.uniform(-5, 5, (40, 2))]
+    for start, goal in zip(starts, goals, strict=True):
+        controller.reset()
+        step = controller.step((*start, 0.0, 0.0), goal)
+        assert step.status == "optimal" and step.feasible, step.slack

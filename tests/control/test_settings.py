@@ -92,6 +92,9 @@ def test_the_settings_among_people_look_3_s_ahead_and_have_a_price_of_decay() ->
     fast = szlib.MPCSettings.among_people(v_max=1.5, dt=0.05)
     assert fast.lookahead == pytest.approx(1.5 * 1.5 + 1.0)
     assert szlib.MPCSettings.among_people(lookahead=2.0).lookahead == 2.0
+    for plan in ({"grid": (1,) * 8}, {"grid": (), "N": 8}):
+        near = szlib.MPCSettings.among_people(**plan)
+        assert near.lookahead == pytest.approx(1.0 + near.times[-1] * near.v_max)
 
 
 def test_a_terminal_condition_and_a_grid_have_barriers_on_the_whole_horizon() -> None:

@@ -207,6 +207,27 @@ def test_explain_says_what_would_help(state, goal, settings, helps):
     assert "what helps: " in said and helps in said, said
 
 
+def test_explain_tells_a_zone_that_is_crossed_from_an_overlap():
+    settings = {"dt": 0.5, "gamma": 1.0, "guard": False}
+    person = szlib.Person((0.0, 0.0), (-0.635, 0.0))
+    step = controller_of(**settings).step(
+        (-1.4, -0.86, 0.166, -0.672), (3.408, 2.094), [person]
+    )
+    assert not step.safe and step.clearance[:, :2].min() > 0.1
+    assert "may enter a zone on its way" in step.explain()
+    hit = szlib.Person((0.0, 0.0), (8.0, 0.0), zone=SMALL)
+    step = controller_of(dt=0.5, guard=False).step((2, 0, 0, 0), (2, 0), [hit])
+    assert step.h.min() > 0 and "may overlap a body or a wall" in step.explain()
+
+
+def test_explain_names_no_people_where_only_a_wall_is_unsafe():
+    controller = controller_of(walls=[[(0.8, -3.0), (0.8, 3.0)]])
+    step = controller.step((0, 0, 1, 0), (5, 0), [szlib.Person((-30.0, 0.0))])
+    assert not step.walls_safe and not step.passively_safe
+    said = step.explain()
+    assert "cannot stop before a wall" in said and "somebody" not in said
+
+
 def test_explain_of_a_robot_without_progress_names_what_holds_it_and_what_helps():
     wall = [[(3, -1), (3, 4)]]
     plain = controller_of(walls=wall)
@@ -235,3 +256,11 @@ def test_steps_are_compared_as_objects():
     controller = controller_of()
     steps = [controller.step((-4, 0, 0, 0), GOAL, [FACING]) for _ in range(2)]
     assert steps[0] == steps[0] and steps.index(steps[1]) == 1 and len({*steps}) == 2
+
+
+def test_a_wall_is_named_to_the_millimetre_on_any_map():
+    base = np.array([500123.4, 4001234.5])
+    wall = base + np.array([(1.0, -2.0), (1.0, 2.0)])
+    step = controller_of(walls=[wall]).step((*base, 0, 0), base - (3, 0))
+    name = "wall 0 (500124.4, 4001232.5, 500124.4, 4001236.5)"
+    assert f"nearest is {name}: h" in step.explain()

@@ -35,6 +35,7 @@ from szlib.control.ways import (
     GROUP_SECOND,
     GROUP_SPEED,
     MOST_CELLS,
+    SEARCH_TIME,
     SMALLEST_CELL,
     SWITCH_GAIN,
     ZONE_SECOND,
@@ -952,3 +953,33 @@ def test_a_small_robot_takes_a_door_in_which_it_fits(r_robot, angle) -> None:
     step = controller.step((*start, 0.0, 0.0), goal)
     assert not step.goal_blocked
     assert "through the door" in step.way
+
+
+def predicted_walker(y: float, speed: float, knots: list[tuple[float, float]]):
+    """A person at (2, y) who walks along y, and is predicted to be at each y of the `knots` (t, y)."""
+    times, ys = np.transpose(knots)
+    prediction = Prediction(times, np.column_stack([np.full(len(ys), 2.0), ys]))
+    return szlib.Person((2.0, y), (0.0, speed), prediction=prediction)
+
+
+@pytest.mark.parametrize(("time", "speed"), [(6.0, 0.5), (4.8, 0.45), (4.8, 0.4)])
+def test_a_way_does_not_lead_through_somebody_who_is_predicted_to_come_back(
+    time, speed
+) -> None:
+    """At the end they are where they began; in between they are in the robot's way."""
+    person = predicted_walker(1.6, speed, [(time, 1.6 - speed * time)])
+    step = szlib.MPCCBF(ZONE, settings=AMONG).step((-1, 0, 0.8, 0), (5, 0), [person])
+    times = np.linspace(0.0, SEARCH_TIME, 200)
+    (places,) = find_places([person], times)
+    gaps = np.hypot(*(step.ways[0].at(times) - places).T) - AMONG.r_robot - BODY_RADIUS
+    assert gaps.min() > 0
+
+
+def test_front_and_behind_are_those_of_the_walk_at_that_time() -> None:
+    """They walk to the left now, and are predicted to walk to the right when the robot is there."""
+    person = predicted_walker(1.0, 0.5, [(1.0, 1.5), (12.0, -7.3)])
+    step = szlib.MPCCBF(ZONE, settings=AMONG).step((-1, 0, 0.8, 0), (5, 0), [person])
+    (x, y), times = step.ways[0].points.T, step.ways[0].times
+    k = int(np.searchsorted(x, 2.0))
+    is_behind = y[k] > person.after(float(times[k])).position[1]
+    assert step.way == f"{'behind' if is_behind else 'in front of'} person 0"
