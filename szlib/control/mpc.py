@@ -481,7 +481,7 @@ class MPCCBF(Controller):
             numbers = np.array(placed)
             if [each for each in people if each.prediction]:
                 numbers = np.hstack([numbers, [list_knots(each, s) for each in people]])
-            offsets = np.full(len(people), s.r_robot + s.eps)
+            offsets = np.array(len(people) * [s.r_robot + s.eps])
             zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 

@@ -199,7 +199,7 @@ class Obstacle:
 
     Parameters
     ----------
-    numbers : the parameters of `distance`, finite.
+    numbers : the parameters of `distance`, finite, at least one.
 
     Attributes
     ----------
@@ -245,7 +245,8 @@ class Obstacle:
         _KINDS[cls.kind] = cls
 
     def __init__(self, *numbers: float) -> None:
-        given = check_array(f"the numbers of a {self.kind}", numbers, (len(numbers),))
+        n = len(numbers) or 1
+        given = check_array(f"the numbers of a {self.kind}", numbers, (n,))
         self.numbers = tuple(given.tolist())
 
     def check(self) -> None:
@@ -417,9 +418,9 @@ class Wall(Obstacle):
     def margin(self, settings: MPCSettings) -> float:
         """Margin around this wall by the `settings` [m]: see `MPCSettings.margin`."""
         xa, ya, xb, yb = self.numbers
-        is_more = settings.margin == "required"
-        needed = settings.r_robot**2 / hypot(xb - xa, yb - ya) if is_more else 0.0
-        return max(settings.eps, needed)
+        if settings.margin != "required":
+            return settings.eps
+        return max(settings.eps, settings.r_robot**2 / hypot(xb - xa, yb - ya))
 
     @classmethod
     def bounds(cls, numbers: Array, offsets: Array) -> tuple[Array, Array]:
@@ -750,7 +751,7 @@ class Obstacles(NamedTuple):
         found = [np.empty((0, *shape))]
         for kind, numbers, offsets in self.groups:
             values = getattr(kind, formula)(x, y, t, *numbers.T[axes])
-            found.append(values - is_barrier * offsets[axes])
+            found.append(values - offsets[axes] if is_barrier else values)
         return np.concatenate(found)
 
 

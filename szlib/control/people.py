@@ -250,12 +250,8 @@ class Person:
         vars(self).update(position=position, velocity=velocity, heading=heading)
         if isinstance(self.zone, Ellipse):
             as_ellipse(self.zone, 0.0)
-        try:
-            hash(self.group)
-        except TypeError as error:
-            raise SolverError(
-                f"a group must be hashable, such as a number; got {self.group!r:.200}"
-            ) from error
+        is_name = isinstance(self.group, Hashable)
+        check_argument(is_name, "a group", self.group, "hashable, such as a number")
         is_one = isinstance(self.prediction, Prediction | None)
         check_argument(is_one, "prediction", self.prediction, "a Prediction")
 

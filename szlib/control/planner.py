@@ -314,6 +314,8 @@ class Planner:
 
     def __init__(self, settings: MPCSettings) -> None:
         self.settings = settings
+        # the last change of a plan of long steps may leave it too fast
+        self._is_coarse = hypot(*np.diff(settings.times)) > TOLERANCE**0.5 / CONVERGED
         self._programs = dict[Any, Program]()
         self._thread = dict[str, int]()
         self.reset()
@@ -418,7 +420,7 @@ class Planner:
         program = self.prepare(question, has_floors)
         s = self.settings
         program.inputs[:], program.multipliers[:] = guess, self._on_speed
-        before = np.zeros(guess.size)
+        before: Array | None = None
         for _ in range(s.max_iterations):
             program.evaluate()
             solved = program.solve()
@@ -426,7 +428,7 @@ class Planner:
                 self._on_speed[:] = 0.0
                 return Plan(program.inputs.copy(), inf, (inf,), True, self.is_late)
             step, is_relaxed = solved
-            if step @ before < -(before @ before) / 2:
+            if before is not None and step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever
             before = step
             program.inputs += step.reshape(-1, 2)
@@ -435,15 +437,13 @@ class Planner:
             if is_converged or timed_out:
                 break
         self._on_speed[:] = program.multipliers
-        inputs = program.inputs.clip(-s.a_max, s.a_max)
-        states = build_horizon(s).states(np.array(question.state), inputs)
-        speeds = np.hypot(*states[:, 2:].T).clip(s.v_max)
-        # the last change of long steps may leave it too fast
-        is_converged &= bool(speeds.max() ** 2 - speeds[0] ** 2 <= TOLERANCE)
-        if not is_converged:
+        inputs = np.minimum(np.maximum(program.inputs, -s.a_max), s.a_max)
+        is_exact = is_converged and not self._is_coarse
+        if not is_exact:
+            states = build_horizon(s).states(np.array(question.state), inputs)
             inputs = follow_velocities(s, question.state[2:], states[1:, 2:])
         program.inputs[:] = inputs
-        if is_relaxed or not is_converged:
+        if is_relaxed or not is_exact:
             program.evaluate()
             is_relaxed = is_relaxed or program.is_violated()
         violations = program.sum_violations() if is_relaxed else ()

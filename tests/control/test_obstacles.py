@@ -653,24 +653,12 @@ def test_an_obstacle_without_a_barrier_condition_is_verified_and_run(level, sett
     assert szlib.simulate(scenario, controller).metrics()["outcome"] == "arrived"
 
 
-@pytest.mark.parametrize("settings", [S, szlib.MPCSettings.among_people()])
-def test_an_obstacle_may_have_no_numbers(settings):
+def test_an_obstacle_without_numbers_is_refused():
     class Pool(Obstacle):
-        @staticmethod
-        def distance(x, y, t):
-            return ((x - 2) ** 2 + y**2) ** 0.5 - 0.5
+        distance = staticmethod(lambda x, y, t: ((x - 2) ** 2 + y**2) ** 0.5 - 0.5)
 
-    class Table(Obstacle):
-        distance = staticmethod(lambda x, y, t, px: ((x - px) ** 2 + y**2) ** 0.5 - 0.5)
-
-    steps = [
-        szlib.MPCCBF(ZONE, obstacles=obstacles, settings=settings).step(
-            (0, 0.1, 0.5, 0), (5, 0)
-        )
-        for obstacles in ([Pool(), Pool()], [Table(2.0), Table(2.0)])
-    ]
-    assert steps[0].verify().faults == () and steps[0].clearance.shape[0] == 2
-    np.testing.assert_array_equal(steps[0].inputs, steps[1].inputs)
+    with pytest.raises(szlib.SolverError, match=r"the numbers of a pool .*\(1,\)"):
+        Pool()
 
 
 def test_decay_is_no_priority_of_an_obstacle():
