@@ -216,3 +216,9 @@ def test_avoidance_starts_at_a_tenth_of_a_metre_from_the_line():
     off = find_avoidance_start(run, deviation=0.05)[0]
     assert off == pytest.approx(np.hypot(*(np.array([3.79, 4.97]) - (9, 12))))
     assert np.isnan(find_avoidance_start(run, deviation=0.3)).all()
+
+
+def test_the_inputs_of_a_controller_of_another_robot_are_unknown():
+    run = make_run(with_speeds(CRUISE), inputs=("a", "omega"))
+    with pytest.raises(szlib.DataError, match=r"inputs must be \('ax', 'ay'\)"):
+        run.controller_inputs(0.0)
