@@ -123,6 +123,8 @@ class Scenario:
 class Variations:
     """Random variations of one scenario, one for each seed: worlds for `rollouts`.
 
+    People lose their prediction: it is of another start and speed.
+
     Parameters
     ----------
     scenario : the scenario.
@@ -153,6 +155,7 @@ class Variations:
                     position=np.add(person.position, shift).tolist(),
                     velocity=velocity.tolist(),
                     zone=self.zone or person.zone,
+                    prediction=None,
                 )
             )
         return replace(self.scenario, start=start, people=tuple(people))
