@@ -529,7 +529,7 @@ record.check("somebody who walks into the robot finds it at rest", speed <= 1e-3
 #
 # Each world is driven for 15 s (150 steps). Two sets:
 #
-# - **all**: 1-5 people who walk or stand, walls in half of the worlds, any start, heading and goal;
+# - **all**: 1-5 people who walk or stand, walls in 45 % of the worlds, any start, heading and goal;
 # - **one person** in open space; the robot starts at rest with $h \ge 0.3$ m.
 #
 # "paper" is `MPCSettings.paper()`. "szlib" has our defaults; each other formulation changes one of them. "paper" and

@@ -50,8 +50,9 @@ class LoopSettings:
     Parameters
     ----------
     behaviour : how people move and how the controller sees them.
-    crowd : the true people, in place of those of `behaviour`. If the scenario has people, the crowd must have
-        as many, and their zones apply; else each person has the zone with which they first appear.
+    crowd : the true people, in place of those of `behaviour`, which then only decides whom the controller
+        sees. If the scenario has people, the crowd must have as many, and their zones apply; else each person
+        has the zone with which they first appear.
     seed : seed of the behaviour.
     zone_transform : makes the zone that the robot keeps out of from each person's own zone, or the
         controller's, or `BODY_ZONE`; from the smallest circle around it for a person without a heading.
@@ -238,10 +239,8 @@ class _People:
             replace(p, zone=self._zone_of(i, p)) for i, p in enumerate(scenario.people)
         )
         self._n_people = len(people) or None
-        crowd = loop.crowd
-        if crowd is None:
-            crowd = loop.behaviour.start(replace(scenario, people=people), loop.seed)
-        self._crowd = crowd
+        # it advances also where `loop.crowd` moves the people: what is observed may depend on it
+        self._crowd = loop.behaviour.start(replace(scenario, people=people), loop.seed)
 
     def _zone_of(self, i: int, person: Person | None) -> Ellipse:
         """The zone of person `i`, made from the `person` at the first call; None: they never appear."""
@@ -263,6 +262,8 @@ class _People:
     def locate(self, time: float, robot: Array) -> list[Person | None]:
         """The people at a `time` [s] with their zones; SolverError if their number changes."""
         people = self._crowd(time, robot)
+        if self._loop.crowd is not None:
+            people = self._loop.crowd(time, robot)
         if self._n_people is None:
             self._n_people = len(people)
         if len(people) != self._n_people:

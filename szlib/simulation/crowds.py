@@ -306,10 +306,10 @@ class SocialForceModel:
             others = np.vstack([others, robot[:2]])
             their_velocities = np.vstack([their_velocities, robot[2:]])
         force = (course * speeds - self._velocities) / RELAXATION_TIME
-        force = force + STRENGTH * _push_apart(
+        force += STRENGTH * _push_apart(
             positions[:, None] - others, self._velocities[:, None] - their_velocities
         )
-        force = force + WALL_STRENGTH * self._push_from_walls(positions)
+        force += WALL_STRENGTH * self._push_from_walls(positions)
         desired = self._velocities + dt * force
         speed = _normalise(desired)[1]
         velocities = desired * np.minimum(1.0, speeds / np.maximum(speed, _SMALLEST))
@@ -328,9 +328,9 @@ def _push_apart(offset: Array, velocity: Array) -> Array:
     away, distance = _normalise(offset)
     along, size = _normalise(away - 2 * velocity)
     reach = REACH * np.maximum(size, _SMALLEST)
-    theta = np.arctan2(along[..., 1:], along[..., :1])
-    theta = theta - np.arctan2(away[..., 1:], away[..., :1])
     left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    # the angle from away to along, in [-pi, pi] in every frame
+    theta = np.arctan2(-(left * away).sum(-1), (along * away).sum(-1))[..., None]
     push = np.exp(-distance / reach - (3 * reach * theta) ** 2)
     turn = np.sign(theta) * np.exp(-distance / reach - (2 * reach * theta) ** 2)
     return np.asarray((push * along - turn * left).sum(axis=1))
@@ -346,7 +346,7 @@ def _list_points(wall: Array) -> Array:
     """Points of a wall, `POINTS_PER_METRE` of them; a short wall is lengthened to `MIN_WALL_LENGTH`."""
     middle = wall.mean(axis=0)
     half = (wall[1] - wall[0]) / 2
-    half = half * max(1.0, MIN_WALL_LENGTH / (2 * np.hypot(*half)))
+    half *= max(1.0, MIN_WALL_LENGTH / (2 * np.hypot(*half)))
     first = middle - half
     last = middle + half
     return np.linspace(
@@ -471,15 +471,16 @@ class _ReactingCrowd:
                 heading = person.heading
                 if hypot(*velocity) >= MIN_HEADING_SPEED:
                     heading = atan2(velocity[1], velocity[0])
-                moved = replace(
-                    person,
-                    position=position,
-                    velocity=velocity,
-                    heading=heading,
-                    heading_unknown=heading is None,
-                    prediction=None,
+                people.append(
+                    replace(
+                        person,
+                        position=position,
+                        velocity=velocity,
+                        heading=heading,
+                        heading_unknown=heading is None,
+                        prediction=None,
+                    )
                 )
-                people.append(moved)
             self._people = tuple(people)
         self._time = t
         self._robot = np.array(robot, float)

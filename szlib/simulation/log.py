@@ -158,7 +158,7 @@ class SimulationLog(Run):
             ],
             "scenario": scene,
             "people": [
-                _pick(each, "position", "velocity", "heading")
+                _pick(each, "position", "velocity", "heading", "heading_unknown")
                 for each in scenario.people
             ],
         }

@@ -82,8 +82,9 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         everything fixed.
     min_clearance, min_clearance_people, min_clearance_walls : smallest Euclidean gap from the robot's disc
         to a person's body or to a wall; negative is an overlap.
-    min_speed, mean_speed, max_speed : speed of the robot until the arrival; min_speed after the start-up and
-        before the robot brakes into the goal, after it last has `CRUISE_FRACTION` of its greatest speed.
+    min_speed, mean_speed, max_speed : speed of the robot until the arrival; min_speed only after the start-up
+        and until the robot last has `CRUISE_FRACTION` of its greatest speed, because then it brakes into the
+        goal. So it leaves out a stop from which the robot does not recover; `time_stopped` has it.
     time_stopped : time below `STOPPED_SPEED` after the robot is first faster, until the arrival.
     time_yielding : see `find_yielding_steps`; NaN if the controller does not report its conditions.
     passing_side : "right", "left" or "none"; see `find_passing_side`.
@@ -224,8 +225,8 @@ def _project_on_course(run: Run, offset: Array) -> tuple[Array, Array]:
 def find_passing_side(run: Run) -> str:
     """Side on which the robot of a `run` passes the person who comes closest: "right", "left" or "none".
 
-    "right" means: the person is to the left of the line from start to goal when abeam of the robot.  "none"
-    means: the person is never abeam.
+    "right" means: the robot has the person to its left, seen along the line from start to goal, when it last
+    passes abeam of them.  "none" means: it never passes them, as where a person overtakes the robot.
     """
     if not run.zones:
         return "none"
@@ -313,20 +314,22 @@ def _has_free_path(run: Run) -> bool:
         x, y, heading = run.people[-1, i, :3].tolist()
         zones.append(Zone(*Zone.place(run.zones[i], (x, y), heading, (0.0, 0.0))))
     ends = np.array([run.states[-1, :2], run.scenario.goal])
-    places = [ends, run.people[-1, :, :2], run.scenario.walls.reshape(-1, 2)]
-    everything = np.vstack(places)
+    everything = np.vstack(
+        [ends, run.people[-1, :, :2], run.scenario.walls.reshape(-1, 2)]
+    )
     low = np.nanmin(everything, axis=0) - _MARGIN
     high = np.nanmax(everything, axis=0) + _MARGIN
     axes = [np.arange(low[i], high[i], _CELL) for i in range(2)]
-    cells = np.meshgrid(*axes, indexing="ij")
+    cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=1)
     obstacles = Obstacles.of([*zones, *run.scenario.fixed], run.settings)
-    is_free = nanmin(obstacles.h(*cells), axis=0) >= 0
+    # row by row: h of all obstacles at all cells of a large map needs gigabytes
+    is_free = [nanmin(obstacles.h(x, y), axis=0) >= 0 for x, y in cells]
     regions = label(is_free, structure=np.ones((3, 3)))[0]
     reached = list[set[int]]()
     for i, j in np.round((ends - low) / _CELL).astype(int):
         around = regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
-        reached.append(set(around.ravel().tolist()) - {0})
-    return not reached[0].isdisjoint(reached[1])
+        reached.append({*around.flat} - {0})
+    return bool(reached[0] & reached[1])
 
 
 def classify_strategy(run: Run) -> Strategy:

@@ -146,14 +146,19 @@ class Run:
         return nanmin(self.residual[:, : len(self.zones)], axis=(1, 2))
 
     def controller_inputs(self, time: float) -> tuple[Array, Array, list[Person]]:
-        """State, goal and people, with their zones, as the controller was given them at a `time` [s].
+        """State, goal and the true people, with their zones, at a `time` [s], for `Controller.step`.
 
-        `controller.step(*run.controller_inputs(5.0))` decides there again.
+        `controller.step(*run.controller_inputs(5.0))` decides there again, if the controller remembers
+        nothing and saw all people as they were.  The run does not hold noise, whom the controller did not
+        see, unknown headings, ids, groups and predictions.
 
         Raises
         ------
-        DataError : the run has no such time.
+        DataError : the run has no such time, or its robot has other controls than (ax, ay), and so another
+            state.
         """
+        expected = "('ax', 'ay'): a run holds no more of another robot than its disc"
+        require(self.inputs == ("ax", "ay"), "inputs", self.inputs, expected)
         row = round(time / self.settings.dt)
         expected = f"a time of the run, from 0 to {self.time[-1]:g} s"
         require(0 <= row < len(self.states), "time", time, expected)

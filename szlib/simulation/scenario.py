@@ -13,14 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control import (
-    MPCSettings,
-    Obstacle,
-    Obstacles,
-    Person,
-    Wall,
-    Zone,
-)
+from ..control import MPCSettings, Obstacle, Obstacles, Person, Wall, Zone
 from ..control.obstacles import euclidean_segment_formula
 from ..control.walls import read_walls
 from ..core.checks import Array, check_array, require
@@ -123,6 +116,8 @@ class Scenario:
 class Variations:
     """Random variations of one scenario, one for each seed: worlds for `rollouts`.
 
+    People lose their prediction: it is of another start and speed.
+
     Parameters
     ----------
     scenario : the scenario.
@@ -153,6 +148,7 @@ class Variations:
                     position=np.add(person.position, shift).tolist(),
                     velocity=velocity.tolist(),
                     zone=self.zone or person.zone,
+                    prediction=None,
                 )
             )
         return replace(self.scenario, start=start, people=tuple(people))
@@ -162,14 +158,16 @@ class Variations:
 class Worlds:
     """What random worlds contain.  Called with a seed, it draws a world: `worlds(seed)`.
 
-    Values are drawn uniformly from their ranges.  All defaults are assumed.
+    Values are drawn uniformly from their ranges.  A world without space for the robot, or with another
+    distance to the goal, is drawn again, so that worlds with walls or many people are fewer than drawn.  All
+    defaults are assumed.
 
     Parameters
     ----------
     people : smallest and largest number of people.
     standing : fraction of people who stand.
     pace : smallest and largest walking speed [m/s]; the paper's people walk at 0.5 m/s.
-    walls : fraction of worlds with walls.
+    walls : probability that a draw has walls; by default some 44 % of the worlds have some.
     max_walls : largest number of walls in a world with walls.
     wall_length : smallest and largest length of a wall [m].
     size : side of the square in which start, goal, people and midpoints of walls lie [m].
@@ -221,8 +219,9 @@ class Worlds:
         """The world of a `seed`: the same one each time, whatever controller drives in it.
 
         Start and goal are clear of walls, by the distance that a robot of the default radius needs.  The goal
-        is clear of people who stand.  People keep clear of walls and, at the start, of each other's bodies;
-        walkers never cross a wall.  All people have one zone: `zone`, or one drawn by `draw_zone`.
+        is clear of people who stand.  People keep clear of walls and, at the start, of each other's bodies.
+        Paths are checked at 31 places: walkers cross no wall, unless they walk farther than 15 m.  All people
+        have one zone: `zone`, or one drawn by `draw_zone`.
 
         Raises
         ------
@@ -287,9 +286,7 @@ def draw_zone(rng: np.random.Generator) -> Ellipse:
 
 def _draw_walls(rng: np.random.Generator, w: Worlds) -> Array:
     count = (
-        int(rng.integers(1, w.max_walls, endpoint=True))
-        if rng.uniform() < w.walls
-        else 0
+        rng.integers(1, w.max_walls, endpoint=True) if rng.uniform() < w.walls else 0
     )
     middle = rng.uniform(-w.size / 2, w.size / 2, (count, 2))
     angle = rng.uniform(0, pi, count)
@@ -305,7 +302,7 @@ def _draw_people(
     people: list[Person] = []
     times = w.duration * _FRACTIONS
     ends = walls.reshape(-1, 4).T
-    for _ in range(int(rng.integers(*w.people, endpoint=True))):
+    for _ in range(rng.integers(*w.people, endpoint=True)):
         for _ in range(100):
             x, y = rng.uniform(-w.size / 2, w.size / 2, 2).tolist()
             heading = rng.uniform(-pi, pi)

@@ -46,7 +46,7 @@ _ENTRIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 # Data sets by name.
 DATA_SETS = {name: DataSet(**entry) for name, entry in _ENTRIES.items()}
 NAMES = (SYNTHETIC, *DATA_SETS)
-_NAMED = ", ".join(map(repr, NAMES))
+_NAMED = ", ".join(map(repr, DATA_SETS))
 
 
 def find(data: str | Path | Sequence[str | Path]) -> list[Path]:
@@ -127,7 +127,7 @@ def _expand(name: str | Path) -> list[Path]:
     """The regular files that a path stands for; reading a FIFO or a device would never end."""
     path = Path(name)
     shown = printable(name)
-    expected = f"expected {_NAMED}, or a file, folder or glob of tracks"
+    expected = f"expected {_NAMED}, or a file, folder or glob of tracks ('synthetic' is for szlib run alone)"
     with explain_errors(f"{shown}: cannot be looked up", expected):
         root = Path(path.anchor)
         found = [path] if path.exists() else [*root.glob(str(path.relative_to(root)))]

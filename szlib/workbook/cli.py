@@ -197,9 +197,8 @@ def _run(options: argparse.Namespace) -> int:
     outcomes = summary["notebooks"].items()
     refused = {name: o["error"] for name, o in outcomes if o["status"] == "refused"}
     if refused:
-        error = next(iter(refused.values()))
         raise SzlibError(
-            f"{', '.join(refused)}: could not be run: {error}; finished results stay"
+            f"{', '.join(refused)}: could not be run: {next(iter(refused.values()))}; finished results stay"
         )
     return 0 if summary["passed"] else 1
 

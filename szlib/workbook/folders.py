@@ -197,6 +197,8 @@ def read_json_object(path: Path) -> dict[str, Any]:
 
 def require_place(file: Path) -> Path:
     """The `file`, if it can be written to its folder: before hours of work, not after them."""
+    if file.is_dir():
+        raise StorageError(f"{printable(file)}: is a folder; name a file in it")
     if not file.parent.is_dir() or not os.access(file.parent, os.W_OK):
         raise StorageError(
             f"{printable(file.parent)}: is no folder that can be written; choose another one"

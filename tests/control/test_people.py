@@ -489,10 +489,9 @@ def test_a_person_with_unusable_numbers_raises_an_error(arguments, message):
         szlib.Person(**arguments)
 
 
-@pytest.mark.parametrize("group", [[1], (1, [1])])
-def test_a_group_that_is_no_name_is_refused(group):
+def test_a_group_that_is_no_name_is_refused():
     with pytest.raises(szlib.SolverError, match=r"a group must be hashable.*\[1\]"):
-        szlib.Person((0.0, 0.0), group=group)
+        szlib.Person((0.0, 0.0), group=[1])
 
 
 def test_a_tracker_that_was_reset_is_as_a_new_one():

@@ -125,8 +125,8 @@ def test_the_social_force_between_two_people_is_that_of_its_source():
     n = np.array([-t[1], t[0]])
     b = 0.35 * size
     theta = np.arctan2(e[1], e[0]) - np.arctan2(t[1], t[0])
-    slow = -4.5 * np.exp(-d / b - (2 * b * theta) ** 2)
-    turn = -4.5 * np.sign(theta) * np.exp(-d / b - (3 * b * theta) ** 2)
+    slow = -4.5 * np.exp(-d / b - (3 * b * theta) ** 2)  # n' = 3
+    turn = -4.5 * np.sign(theta) * np.exp(-d / b - (2 * b * theta) ** 2)  # n = 2
     equal = szlib.MPCSettings(r_robot=0.25)  # a robot as large as a person
     model = SocialForceController(szlib.Scenario("two", START, GOAL), equal)
     # the source has no bias of the angle here; it turns theta by 0.005 B
@@ -137,3 +137,19 @@ def test_the_social_force_between_two_people_is_that_of_its_source():
     )
     found = (beside - alone) / equal.dt
     assert found == pytest.approx(slow * t + turn * n, abs=0.05)
+
+
+def test_other_obstacles_push_as_walls_do():
+    edge = szlib.control.HalfPlane((0.0, -0.7), (0.0, 1.0))
+    wall = ((-99.0, -0.7), (99.0, -0.7))
+    scenes = [
+        szlib.Scenario("beside", START, GOAL, walls=walls, obstacles=obstacles)
+        for walls, obstacles in (((), ()), ((wall,), ()), ((), (edge,)))
+    ]
+    free, by_wall, by_edge = (
+        SocialForceController(scene, SETTINGS).desired_velocity(np.zeros(4), GOAL, ())
+        for scene in scenes
+    )
+    push = SETTINGS.dt * 3.0 * np.exp(-(0.7 - SETTINGS.r_robot) / 0.1)
+    assert by_wall - free == pytest.approx((0.0, push))
+    assert by_edge == pytest.approx(by_wall)

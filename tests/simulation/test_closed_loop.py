@@ -12,7 +12,7 @@ from studies.summaries import summarise
 import szlib
 from szlib.simulation.baseline_controllers import make_mpc_cbf
 from szlib.simulation.closed_loop import BODY_ZONE, LoopSettings, drive
-from szlib.simulation.crowds import Behaviour
+from szlib.simulation.crowds import Behaviour, VisiblePeople
 from szlib.simulation.monte_carlo import (
     RolloutSetup,
     compare,
@@ -283,6 +283,18 @@ def test_a_log_with_absent_people_is_saved_and_loaded(tmp_path):
     pd.testing.assert_frame_equal(back.table, log.table)
     assert back.metrics() == log.metrics()
     assert np.array_equal(back.residual, log.residual, equal_nan=True)
+
+
+def test_walls_hide_people_of_a_given_crowd():
+    scene = replace(WALK, walls=[((0.0, -1.0), (0.0, 1.0))])
+    controller = Straight()
+    loop = LoopSettings(
+        behaviour=VisiblePeople(),
+        crowd=lambda t, _: (person(2.0, 0.0), person(-2.0, 1.5)),
+        max_time=0.1,
+    )
+    drive(scene, controller, loop)
+    assert [[p.position for p in seen] for seen in controller.seen] == [[(-2, 1.5)]] * 2
 
 
 def test_a_crowd_model_needs_only_two_methods():

@@ -211,7 +211,7 @@ def push_of_person(here, other, v, w):
     along = away - 2 * (v - w)
     reach = 0.35 * abs(along)
     along /= abs(along)
-    theta = cmath.phase(along) - cmath.phase(away)
+    theta = cmath.phase(along / away)
     near = abs(here - other) / reach
     push = math.exp(-near - (3 * reach * theta) ** 2)
     turn = math.copysign(math.exp(-near - (2 * reach * theta) ** 2), theta)
@@ -244,6 +244,18 @@ def test_social_force_is_the_formula_of_its_source():
         expected = v + dt * force
         expected *= min(1.0, speeds[i] / abs(expected))
         assert found[i] @ (1, 1j) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("turn", [1j, -1, -1j, cmath.exp(2j)])
+def test_social_force_does_not_depend_on_the_direction_of_x(turn):
+    def velocities(factor):
+        """Of two people who meet head-on in a scene that is turned by a `factor`."""
+        meet = np.array([[-1, 1 + 0.02j], [1 - 0.03j, -1 + 0.02j], [9, -9]]) * factor
+        pairs = np.stack([meet.real, meet.imag], axis=-1)
+        people = Walkers(*pairs, np.ones(2), np.zeros((0, 2, 2)), None)
+        return SocialForceModel(people).velocities(pairs[0], np.zeros(4), 0.1) @ (1, 1j)
+
+    assert velocities(turn) == pytest.approx(turn * velocities(1), abs=1e-12)
 
 
 # --- replay ------------------------------------------------------------------------------------------

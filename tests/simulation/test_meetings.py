@@ -88,6 +88,15 @@ def test_variations_without_a_zone_keep_the_zones_of_people():
     assert Variations(MEETINGS["overtaking"])(0).people[0].zone is None
 
 
+def test_variations_have_no_prediction_of_another_start():
+    turns = szlib.control.Prediction([1.0, 2.0], [(3.5, 0.0), (3.5, 0.5)])
+    person = szlib.Person((4.0, 0.0), (-0.5, 0.0), prediction=turns)
+    scene = szlib.Scenario("turn", (-4, 0, 0, 0), (4, 0), (person,))
+    (varied,) = Variations(scene)(0).people
+    expected = np.add(varied.position, varied.velocity)
+    assert varied.after(1.0).position == pytest.approx(expected)
+
+
 def test_variations_are_worlds_for_rollouts(tmp_path):
     def run(scene, **options):
         worlds = Variations(MEETINGS[scene], ZONE, **options)

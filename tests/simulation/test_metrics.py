@@ -1,5 +1,7 @@
 """Each metric of motion on a run made by hand, whose answer is known."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from helpers.made_runs import make_log
@@ -97,6 +99,17 @@ def test_distances_to_people_and_walls_are_separate():
     assert (found["people"], found["walls"], found["violations"]) == (2, 1, 0)
     alone = compute_metrics(make_run(states))
     assert np.isnan(alone["min_h_people"]) and np.isnan(alone["min_clearance_walls"])
+
+
+def test_a_robot_that_stops_in_a_large_hall_is_measured_in_little_memory():
+    places = np.mgrid[0:40:4, 0:20:2].reshape(2, -1).T
+    walls = np.stack([places, places + np.array([1, 0])], axis=1)
+    run = make_run([(2.5, 1.0, 0.0, 0.0)] * 9, walls=walls, goal=(38.5, 17.0))
+    tracemalloc.start()
+    assert compute_metrics(run)["outcome"] == "deadlock"
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 50e6, "h of 100 walls at all cells takes 90 MB"
 
 
 def test_steps_are_counted_if_their_control_is_applied():
@@ -203,3 +216,9 @@ def test_avoidance_starts_at_a_tenth_of_a_metre_from_the_line():
     off = find_avoidance_start(run, deviation=0.05)[0]
     assert off == pytest.approx(np.hypot(*(np.array([3.79, 4.97]) - (9, 12))))
     assert np.isnan(find_avoidance_start(run, deviation=0.3)).all()
+
+
+def test_the_inputs_of_a_controller_of_another_robot_are_unknown():
+    run = make_run(with_speeds(CRUISE), inputs=("a", "omega"))
+    with pytest.raises(szlib.DataError, match=r"inputs must be \('ax', 'ay'\)"):
+        run.controller_inputs(0.0)

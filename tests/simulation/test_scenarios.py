@@ -344,6 +344,14 @@ def test_a_log_with_an_obstacle_of_an_unknown_kind_is_rejected(tmp_path):
         szlib.SimulationLog.load(tmp_path / "run")
 
 
+def test_a_walker_whose_heading_is_unknown_is_saved_and_loaded(tmp_path):
+    person = szlib.Person((4.0, 0.0), (-0.5, 0.0), heading_unknown=True)
+    scenario = szlib.Scenario("short", (-3.0, 0.0, 0.0, 0.0), (3.0, 0.0), (person,))
+    szlib.simulate(scenario, szlib.MPCCBF(ZONE), max_time=0.1).save(tmp_path / "run")
+    back = szlib.SimulationLog.load(tmp_path / "run")
+    assert back.scenario.people[0].heading is None
+
+
 def test_names_with_a_dot_are_different_runs(tmp_path):
     scenario = szlib.Scenario("short", (-3.0, 0.0, 0.0, 0.0), (3.0, 0.0))
     for gamma, seconds in ((0.1, 0.5), (0.4, 1.0)):

@@ -162,8 +162,10 @@ def test_paths_folders_and_globs_are_found_in_order(tmp_path):
     assert datasets.find(str(tmp_path)) == both
     assert datasets.find(tmp_path / "*.csv") == both
     assert datasets.find([tmp_path / "b.csv", tmp_path / "a.csv"]) == both[::-1]
-    with pytest.raises(DataError, match="expected 'synthetic', 'atc-1hz'"):
-        datasets.find("sinthetic")
+    with pytest.raises(
+        DataError, match=r"expected 'atc-1hz'.*'synthetic' is for szlib run"
+    ):
+        datasets.find("synthetic")
     with pytest.raises(DataError, match="no data was named"):
         datasets.find([])
 

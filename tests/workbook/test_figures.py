@@ -383,6 +383,12 @@ def test_an_animation_has_a_frame_for_each_interval(log):
         assert movie.n_frames == int(np.floor(log.table["t"].iloc[-1] + 1e-9)) + 1
 
 
+@pytest.mark.parametrize(("every", "step"), [(0.4, 0.4), (0.27, 0.3), (0.01, 0.1)])
+def test_an_animation_is_twice_as_fast_as_the_run(log, every, step):
+    with Image.open(io.BytesIO(figures.animate(log, every=every, width=2.0))) as movie:
+        assert movie.info["duration"] == pytest.approx(1000 * step / 2)
+
+
 def test_alt_text_holds_titles_axes_and_legends():
     fig, (left, right) = plt.subplots(1, 2)
     left.plot([0], [0], label="robot")

@@ -121,6 +121,7 @@ def test_the_schema_of_jenkins_refuses(suite, problem):
     [
         ("nowhere/junit.xml", "nowhere: is no folder that can be written"),
         ("mine.csv/junit.xml", "mine.csv: is no folder that can be written"),
+        (".", ": is a folder; name a file in it"),
     ],
 )
 def test_junit_file_that_cannot_be_written_is_refused_before_the_run(

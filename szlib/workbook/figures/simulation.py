@@ -105,7 +105,7 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
     Parameters
     ----------
     run : the run.
-    every : time between two frames of the GIF [s].
+    every : time between two frames of the GIF [s], rounded to steps of the run.
     width : width of the GIF [inch].
 
     Examples
@@ -129,11 +129,11 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
 
     def draw_frame(row: int) -> Image.Image:
         """The scene at a row of the run."""
-        moving: list[Artist] = [
-            *ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1)
+        moving = [
+            *ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1),
+            *ax.plot(*run.predicted[row, :, :2].T, ".", color=GREEN, markersize=3),
+            *draw_moving(ax, run, row, robot=BLUE, zone=RED),
         ]
-        moving += ax.plot(*run.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
-        moving += draw_moving(ax, run, row, robot=BLUE, zone=RED)
         ax.set_title(
             f"t = {run.time[row]:4.1f} s, robot at {run.speed[row]:.2f} m/s (shown twice as fast)"
         )
@@ -145,11 +145,10 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
         # nine times as fast as the default
         return picture.quantize(method=Image.Quantize.FASTOCTREE)
 
-    first, *more = [draw_frame(row) for row in rows.tolist()]
+    first, *more = map(draw_frame, rows.tolist())
     gif = io.BytesIO()
-    first.save(
-        gif, "GIF", save_all=True, append_images=more, duration=500 * every, loop=0
-    )
+    time = 500 * step * run.settings.dt  # of a frame [ms]
+    first.save(gif, "GIF", save_all=True, append_images=more, duration=time, loop=0)
     return Movie(gif.getvalue(), run, (*ax.get_xlim(), *ax.get_ylim()))
 
 
