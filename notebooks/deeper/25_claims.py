@@ -666,15 +666,19 @@ record.claim(trade.claim, trade.low > 0, str(trade))
 corridor, paper, ellipse = szlib.SCENARIOS["corridor"], szlib.MPCSettings.paper(), zone.ellipses[zone_speed]
 way = szlib.simulate(corridor, szlib.MPCCBF(ellipse, walls=corridor.walls))
 moments = [way.controller_inputs(t) for t in way.time[30:55]]
-solve_times, solvers = {}, {"ipopt": ByIpopt, "sqp": szlib.MPCCBF}
-for solver, N_h in product(solvers, range(1, paper.N + 1)):
-    settings = replace(paper, N_h=N_h)
-    controller = solvers[solver](ellipse, walls=corridor.walls, settings=settings)
-    clock = []
-    for moment in moments:
+solvers = {"ipopt": ByIpopt, "sqp": szlib.MPCCBF}
+controllers = {
+    (name, N_h): solvers[name](ellipse, walls=corridor.walls, settings=replace(paper, N_h=N_h))
+    for name, N_h in product(solvers, range(1, paper.N + 1))
+}
+clock = np.empty((len(controllers), len(moments)))
+for k, moment in enumerate(moments):  # all in turn, so that a busy machine slows all alike
+    for i, controller in enumerate(controllers.values()):
+        begin = thread_time()
         controller.step(*moment)
-        clock.append(thread_time())
-    solve_times[solver, N_h] = 1000 * np.diff(clock)  # without the first step, which builds the problem
+        clock[i, k] = 1000 * (thread_time() - begin)
+# without the first step, which builds the problem
+solve_times = dict(zip(controllers, clock[:, 1:], strict=True))
 
 # %% jupyter={"source_hidden": true}
 # Checks
