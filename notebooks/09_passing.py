@@ -326,7 +326,7 @@ Markdown(
 
 # %% [markdown]
 # The four scenarios were used to choose gamma, so they cannot test the choice. 2,000 random worlds can, with one to
-# five people, and with walls in 43 % of them (made by `python -m studies.gamma_table`; a quarter of these worlds are also in notebook 21).
+# five people, some with walls (made by `python -m studies.gamma_table`; a quarter of these worlds are also in notebook 21).
 # This notebook drives one of these worlds again, to test the table. **What do you think?** Is 0.05 the best there, too?
 
 # %% jupyter={"source_hidden": true}

@@ -367,7 +367,8 @@ class Step:
             and worst[Priority.DECAY] > TOLERANCE,
             f"the plan enters a zone by {worst[Priority.ZONE]:.2g} m; what helps: "
             "zone_price=inf": s.zone_price < inf and worst[Priority.ZONE] > TOLERANCE,
-            "it cannot stop before a wall; what helps: start slower": not self.walls_safe,
+            "it cannot stop before a wall, so it may not rest before people come either; what helps: start "
+            "slower": not self.walls_safe,
             "somebody may walk into it before it rests; what helps: a larger body_gap or a lower "
             "v_max": self.walls_safe and not self.passively_safe,
             f"time was up after {min(s.time_limit, s.deadline)} s; what helps: a larger one": self.timed_out,

@@ -249,11 +249,12 @@ def column_of(source: Source, at: str | int) -> Series:
         if not roots or not set(roots) <= set(names):
             raise DataError(f"{lacks}; it has {names[:12]}")
         columns = {root: source.column(names.index(root)) for root in roots}
-        has_texts = re.search(r"\|\||'", at)
         for root, values in columns.items():
-            # it is compared with a number
-            is_number = re.search(rf'\b{re.escape(root)}"?\s*[<>=!]+\s*[-.\d]', at)
-            if is_number or not has_texts:
+            name = rf'"?\b{re.escape(root)}\b"?\s*'
+            beside = (
+                rf"[.\d]\s*[<>=!]+\s*{name}|{name}([<>=!]+|between|in\s*\()\s*[-.\d]"
+            )
+            if not re.search(r"\|\||'", at) or re.search(beside, at, re.IGNORECASE):
                 columns[root] = to_numbers(values, source.decimal)
         return pl.DataFrame(columns).select(sum_.alias("c")).to_series()
 

@@ -102,8 +102,11 @@ def warnings(stages: Stages) -> list[str]:
     >>> funnels.warnings([funnels.stage("warning: nobody walks", 9, 9, {})])
     ['nobody walks']
     """
-    names = [s["stage"] for s in stages]
-    return [n.removeprefix(WARNING) for n in names if n.startswith(WARNING)]
+    return [
+        s["stage"].removeprefix(WARNING)
+        for s in stages
+        if s["stage"].startswith(WARNING)
+    ]
 
 
 def attach(frame: pd.DataFrame, stages: Stages) -> pd.DataFrame:
@@ -227,9 +230,9 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
     rows = rows[:, np.lexsort((rows[0], rows[1]))]
     step, person, *_ = np.diff(rows)
     same = person == 0
-    is_later = np.diff(np.floor(rows[0])) != 0
     # one row a second
-    duration, person, *moved = np.diff(rows[:, np.r_[True, ~same | is_later]])
+    is_first = np.r_[True, ~same | (np.diff(np.floor(rows[0])) != 0)]
+    duration, person, *moved = np.diff(rows[:, is_first])
     by_second = person == 0
     if by_second.sum() < _MIN_STEPS:
         return None

@@ -17,8 +17,8 @@ def describe_rows(rows: pl.DataFrame, recipe: Recipe, name: str) -> str:
 
     The lines say how and where people move, and draw a map.
     """
-    columns = ", ".join(f"{name} = {at}" for name, at in recipe.columns.items())
-    lines = [f"{name} is read as {recipe.file_format}: {columns}"]
+    shown = [f"{name} = {at}" for name, at in recipe.columns.items()]
+    lines = [f"{name} is read as {recipe.file_format}: {', '.join(shown)}"]
     if rows.height == 0:
         return lines[0]
     t, people, x, y = seen = first_rows(rows)

@@ -162,8 +162,9 @@ def merge_files(
         )
     days = pd.Index([*rows["day"].unique().sort().cast(String)])
     codes = pd.Categorical.from_codes(rows["day"].rle_id().to_numpy(), days)
-    columns = {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}
-    frame = pd.DataFrame({"day": codes} | columns)
+    frame = pd.DataFrame({"day": codes})
+    for name in ("id", "t", "x", "y"):
+        frame[name] = rows[name].to_numpy()
     frame.attrs |= {"max_gap": max_gap, "recipe": files[0].recipe.as_json()}
     if area:
         frame.attrs["area"] = area
@@ -213,9 +214,9 @@ def _read_file(source: Any, number: int, recipe: Recipe) -> LoadedFile:
             check_size(rows.n_bytes, path, factor=SCAN_FACTOR)
             return _accept(rows, recipe)
     if hasattr(source, "data") and hasattr(source, "frame_rate"):  # PedPy's
-        rate = float(source.frame_rate)
-        source = source.data
+        rate = source.frame_rate
         recipe = recipe.over(Recipe(columns={"frame": "frame"}, frame_rate=rate))
+        source = source.data
     table = open_table(source, Path(f"table-{number}"))
     return _accept(load_rows(table, replace(recipe, file_format="tidy")), recipe)
 
@@ -292,8 +293,7 @@ def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
 
 def _first_rows(rows: Rows, n: int) -> pl.DataFrame:
     """The first `n` of the `rows` that can be used."""
-    usable = rejection_reason(rows.table).is_null()
-    return rows.table.filter(usable).head(n).collect()
+    return rows.table.filter(rejection_reason(rows.table).is_null()).head(n).collect()
 
 
 def describe_file(path: Path, recipe: Recipe) -> tuple[str, Recipe]:

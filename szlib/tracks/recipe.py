@@ -132,8 +132,12 @@ class Recipe:
         _require_known("columns", self.columns, QUANTITIES)
         if {"t", "frame"} <= set(self.columns):
             raise DataError("columns: both t and frame are given; expected one of them")
-        expected = "a condition in SQL, as text"
-        require(isinstance(self.where, str | None), "where", self.where, expected)
+        require(
+            isinstance(self.where, str | None),
+            "where",
+            self.where,
+            "a condition in SQL, as text",
+        )
         expected = "expected one like 'Asia/Tokyo'"
         with explain_errors(f"unknown time zone {self.tz!r}", expected):
             ZoneInfo(self.tz or "UTC")
@@ -181,8 +185,9 @@ class Recipe:
 
     def save(self, path: str | Path) -> Path:
         """Write the recipe to the file `path`, as JSON; returns its path."""
-        content = json.dumps(self.as_json(), indent=1, ensure_ascii=False)
-        write_file(path, content + "\n")
+        write_file(
+            path, json.dumps(self.as_json(), indent=1, ensure_ascii=False) + "\n"
+        )
         return Path(path)
 
     @classmethod

@@ -154,7 +154,7 @@ def open_json(file: File) -> Source:
             ]
         else:
             rows = [json.loads(line) for line in content.splitlines() if line.strip()]
-        table = pd.DataFrame(rows, dtype=object)
+        table = pd.DataFrame(map(dict, rows), dtype=object)
     return open_table(table, file.path)
 
 
@@ -170,9 +170,11 @@ def open_database(file: File) -> list[Source]:
     address = f"{file.plain.absolute().as_uri()}?mode=ro&immutable=1"
 
     def query(text: str, k: int) -> Iterator[Any]:
-        """The values of column `k` that a query gives, as long as memory is allowed for them."""
+        """The values of column `k` that a query gives, as text, as long as memory is allowed for them."""
         with closing(sqlite3.connect(address, uri=True)) as database:
-            values = (row[k] for row in database.execute(text))
+            database.text_factory = lambda content: content.decode(errors="replace")
+            rows = database.execute(text)
+            values = (None if row[k] is None else str(row[k]) for row in rows)
             some = iter(lambda: [*islice(values, _VALUES_AT_ONCE)], [])
             yield from chain.from_iterable(
                 _check_batches(some, lambda each: sum(map(sys.getsizeof, each)), path)
@@ -186,13 +188,7 @@ def open_database(file: File) -> list[Source]:
         names = [*query(f'PRAGMA table_xinfo("{table}")', 1)]
         columns = ", ".join(f'"{name}"' for name in names)
         select = f'SELECT {columns} FROM "{table}"'
-
-        def column(k: int) -> Series:
-            """The column `k` as text."""
-            values = pd.Series([*query(select, k)], dtype=object)
-            return Series(values.astype("string"))
-
-        return Source(path, names, column)
+        return Source(path, names, lambda k: Series(query(select, k), dtype=pl.String))
 
     try:
         names = query("SELECT name FROM sqlite_master WHERE type = 'table'", 0)
@@ -267,7 +263,9 @@ def _parse_wide(file: File) -> ParsedFile:
         variable=col.variable.str.head(1).str.to_lowercase(),
     )
     rows = long.pivot("variable", index=selectors.exclude("variable", "value"))
-    ragged = Series(source.ragged).gather(rows["row"])
+    # a row that is too short lacks the last people
+    is_long = source.ragged & table.to_series(-1).is_not_null()
+    ragged = is_long.gather(rows["row"])
     found = open_table(rows, file.path)
     return replace(found, decimal=source.decimal, ragged=ragged), {}
 
@@ -305,9 +303,8 @@ def _parse_nuscenes(file: File) -> ParsedFile:
         person = each["instance_token"]
         kind = kinds[instances[person]["category_token"]]["name"]
         if kind.startswith("human"):
-            x, y, _ = each["translation"]
-            t = 1e-6 * sample["timestamp"]
-            rows.append((t, person, x, y, sample["scene_token"]))
+            begin = 1e-6 * sample["timestamp"], person, *each["translation"][:2]
+            rows.append((*begin, sample["scene_token"]))
     return pl.DataFrame(rows, schema=["t", "id", "x", "y", "day"], orient="row"), {}
 
 

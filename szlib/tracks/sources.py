@@ -30,7 +30,7 @@ from ..core.input_files import (
     require_memory,
     unchanged_files,
 )
-from .recipe import SHAPES, Recipe, Shape
+from .recipe import DEGREES, PIXELS, SHAPES, Recipe, Shape
 
 LONGEST_LINE = 100_000
 # bytes of memory for each byte of a text: where it is read (measured: 5.8 with its columns), or scanned (1.3
@@ -40,15 +40,7 @@ SCAN_FACTOR = 2
 _RESERVE = 0.02  # share of a disk that unpacking leaves free
 CONTAINERS = ("PAR1", "ARROW1")  # first letters of Parquet and of Feather
 # What a recipe may say that a scan of rows cannot do: the file is then read as a whole.
-_NOT_STREAMED = [
-    "columns",
-    "where",
-    "unit",
-    "homography",
-    "origin",
-    "frame_rate",
-    "time_unit",
-]
+_NOT_STREAMED = {"columns", "where", "homography", "origin", "frame_rate", "time_unit"}
 
 
 @dataclass(frozen=True)
@@ -72,8 +64,7 @@ class File:
     def head(self) -> str:
         """The first two lines."""
         with self.plain.open("rb") as stream:
-            lines = decode(stream.read(LONGEST_LINE)).splitlines()
-        return "\n".join(lines[:2])
+            return "\n".join(decode(stream.read(LONGEST_LINE)).splitlines()[:2])
 
     def text(self) -> str:
         """The text, or the whole lines in its first `size` bytes."""
@@ -264,9 +255,9 @@ def open_text(file: File, has_header: bool | None = None, n_fields: int = 0) -> 
         schema={"line": String},
         raise_if_empty=False,
     )["line"]
-    # a comment that names the columns, and a first column without a name
-    first = str(lines.first() or "").strip(" #")
-    if not first.strip():
+    # a comment may name the columns
+    first = str(lines.first() or "").strip().lstrip("# ")
+    if not first:
         raise DataError(
             f"{where}, line 1: the file is empty or begins with a blank line"
         )
@@ -306,9 +297,8 @@ def recognise(head: str, path: Path, recipe: Recipe) -> Shape:
     for shape in [recipe.shape] if recipe.file_format else SHAPES.values():
         found = re.match(shape.begins, head, re.MULTILINE)
         named = re.match(shape.file, path.name)
-        # PedPy finds the columns of such a text itself
-        is_own = shape.parse in ("", "txt") and "id" in shape.recipe.columns
-        fits = fields.issuperset(shape.header) and not (recipe.has_people and is_own)
+        is_given = recipe.has_people and "id" in shape.recipe.columns
+        fits = fields.issuperset(shape.header) and (shape.parse or not is_given)
         if found and named and fits:
             break
     groups = found.groupdict() | named.groupdict() if found and named else {}
@@ -326,6 +316,7 @@ def scan_streamed(file: File) -> Rows | None:
     recipe = file.recipe
     shape = recognise(file.head, file.path, recipe)
     is_whole = not shape.is_streamed or file.head.startswith(CONTAINERS)
+    is_whole |= recipe.unit in (PIXELS, DEGREES)
     if is_whole or recipe.as_json().keys() & _NOT_STREAMED:
         return None
     recipe = replace(recipe.over(shape.recipe), file_format=shape.name)
