@@ -264,7 +264,7 @@ def _parse_wide(file: File) -> ParsedFile:
     )
     rows = long.pivot("variable", index=selectors.exclude("variable", "value"))
     # a row that is too short lacks the last people
-    is_long = source.ragged & table.to_series(-1).is_not_null()
+    is_long = source.column(len(source.names)) != ""
     ragged = is_long.gather(rows["row"])
     found = open_table(rows, file.path)
     return replace(found, decimal=source.decimal, ragged=ragged), {}
