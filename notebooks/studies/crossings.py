@@ -143,7 +143,8 @@ def find_settings(controller: str, dt: float, a_max: float) -> szlib.MPCSettings
     eps = 0.1 if controller in CONTROLLERS else 0.05  # a body has 0.25 m for the former
     limits = {"dt": dt, "a_max": a_max, "r_robot": RADIUS, "eps": eps, "time_limit": np.inf}
     if controller == OURS:
-        limits |= {"grid": (1,) * 12} if dt == DT else {}  # 3 s
+        # 3 s; the lookahead with which the table was made
+        limits |= {"grid": (1,) * 12, "lookahead": 8.5} if dt == DT else {}
         among = szlib.MPCSettings.among_people
         return among(body_gap=0.25, **limits).with_gamma_rate(among().gamma_rate)
     paper = szlib.MPCSettings.paper
