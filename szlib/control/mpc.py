@@ -569,12 +569,13 @@ def _shrink_zones(scene: Scene, heading: Heading) -> Obstacles:
     to the body. With an infinite `zone_price` or `decay_price` all zones stay whole.
     """
     s = scene.settings
-    is_priced = max(s.zone_price, s.decay_price) < inf
-    if not (scene.people and heading.ways and is_priced):
+    if not heading.ways or max(s.zone_price, s.decay_price) == inf:
+        return scene.barriers
+    stands = scene.zones.speeds < STANDING_SPEED
+    if not stands.any():
         return scene.barriers
     ((kind, numbers, offsets),) = scene.zones.groups
     points = heading.ways[0].points[1:]
-    stands = scene.zones.speeds < STANDING_SPEED
     h = scene.zones.h(*points.T)
     gaps = scene.zones.gaps(*points.T).min(axis=1)
     is_passed = stands & (gaps >= s.body_gap) & (h[:, -1] >= 0)

@@ -26,7 +26,6 @@ from scipy.ndimage import (
     binary_dilation,
     distance_transform_edt,
     label,
-    minimum_filter1d,
 )
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -552,20 +551,23 @@ def cross_layers(costs: Any, begin: Any, far: Array) -> Array:
 
     From `begin` to the last layer, or to the edge or the goal, where cost and `far` are least together.
     """
-    layers = np.full((len(costs) + 1, *far.shape), inf, np.float32)
-    layers[0, *begin] = 0.0
-    for k, cost in enumerate(costs):
-        across = np.minimum(layers[k], minimum_filter1d(layers[k], 3, 0) + _MOVE_PRICE)
-        moved = minimum_filter1d(across, 3, 1) + _MOVE_PRICE
-        layers[k + 1] = np.minimum(across, moved) + cost
-    ends = layers + far
+    # with a border around each layer, so that all cells have eight neighbours
+    layers = np.full((len(costs) + 1, *np.add(far.shape, 2)), inf, np.float32)
+    within = layers[:, 1:-1, 1:-1]
+    within[0, *begin] = 0.0
+    for layer, cost, after in zip(layers, costs, within[1:], strict=False):
+        moved = np.minimum(layer[:-2], layer[2:]) + _MOVE_PRICE
+        across = np.minimum(layer[1:-1], moved)
+        moved = np.minimum(across[:, :-2], across[:, 2:]) + _MOVE_PRICE
+        after[:] = np.minimum(across[:, 1:-1], moved) + cost
+    ends = within + far
     inside = np.pad(far[1:-1, 1:-1] > 0, 1)
     ends[:-1, inside] = inf
     k, *last = map(int, np.unravel_index(ends.argmin(), ends.shape))
     cells = [np.array(last)]
     for layer in layers[:k][::-1]:
         i, j = cells[-1]
-        near = np.pad(layer, 1, constant_values=inf)[i : i + 3, j : j + 3]
+        near = layer[i : i + 3, j : j + 3]
         cells.append(cells[-1] + np.divmod((near + _MOVES).argmin(), 3) - 1)
     return np.array(cells[::-1])
 
