@@ -60,12 +60,16 @@ lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, fro
 	    --no-header --no-annotate --quiet) > .binder/requirements.txt
 
 # Warnings are no errors here: old libraries warn of each other, which one test of a fresh process does not allow.
-lowest: $(INSTALLED)  ## the suite without the workbook, with the oldest version of every dependency
-	$(BIN)/uv venv --quiet --clear $(VENV)/lowest
-	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct -e ".[cluster,crowds,data,pedpy,test]" matplotlib==3.9.*
+LOWEST ?= tests/tracks tests/encounters tests/zones tests/plaza tests/control tests/simulation
+lowest: $(VENV)/lowest/installed  ## the suite without the workbook, with the oldest version of every dependency; LOWEST="FILE": some
 	$(VENV)/lowest/$(notdir $(BIN))/python -m pytest -p no:cacheprovider -W default -n 2 --dist loadfile \
 	    --deselect tests/simulation/test_crowds.py::test_social_force_leaves_no_file_and_restores_logging \
-	    tests/tracks tests/encounters tests/zones tests/plaza tests/control tests/simulation
+	    $(LOWEST)
+
+$(VENV)/lowest/installed: $(INSTALLED)
+	$(BIN)/uv venv --quiet --clear $(VENV)/lowest
+	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct -e ".[cluster,crowds,test,workbook]"
+	$(BIN)/python -c "open('$@', 'w').close()"
 
 audit: $(INSTALLED)  ## fail where a pinned version has a published vulnerability, or where PyPI cannot be asked
 	@$(BIN)/python -c "import urllib.request; urllib.request.urlopen('https://pypi.org/pypi/pip/json', timeout=20)" \

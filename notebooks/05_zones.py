@@ -316,8 +316,8 @@ record.figure(fig, "sizes")
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# With some hundred encounters the quantile levels out, and its interval lies around it. The hull is an *extreme*: the
-# nearest people who ever came. More people can only bring nearer ones. So its interval, which should contain the hull
+# On the plaza the quantile levels out with some hundred encounters, and its interval lies around it. The hull is an
+# *extreme*: the nearest people who ever came. More people can only bring nearer ones. So its interval, which should contain the hull
 # of *all* people there are, lies below the estimate itself.
 #
 # </details>

@@ -161,7 +161,7 @@ record.figure(fig, "gamma")
 # %% jupyter={"source_hidden": true}
 # Checks, and the answer
 lowest = min(approach(share)[:, 0].min() for share in shares)
-record.check("the robot of the worked example never enters the zone", lowest > 0, f"least h {lowest:.1g} m")
+record.check("the robot of the worked example never enters the zone", lowest >= 0, f"least h {lowest:.1g} m")
 Markdown(
     "<details><summary>Answer</summary>\n\nThe robot slows down where its limit "
     r"$\gamma h / \Delta t$ becomes smaller than the speed that it wants: at $h = v\,\Delta t / \gamma$. For 1 m/s that is "
@@ -176,7 +176,7 @@ Markdown(
 #
 # **Forward invariance.** Write eq. 1 as $h_{k+1} \ge (1-\gamma)\,h_k$. After $k$ steps
 #
-# $$h_k \ge (1-\gamma)^k\, h_0 > 0$$
+# $$h_k \ge (1-\gamma)^k\, h_0 \ge 0$$
 #
 # A robot that starts outside the zone stays outside for ever, *if every step has a solution*. The safe set
 # $\{h \ge 0\}$ is then called *forward invariant*. Remember the *if*: the next figure shows a robot without one.

@@ -17,5 +17,6 @@ def __getattr__(name: str) -> object:
         return _load(name)
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            f"szlib.{name} needs {error.name}: pip install 'szlib[data]'"
+            f"szlib.{name} needs {error.name}: pip install 'szlib[data]'",
+            name=error.name,
         ) from error

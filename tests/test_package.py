@@ -404,9 +404,10 @@ def test_the_error_of_a_missing_package_names_the_extra():
         "import sys; sys.modules['polars'] = None\n"
         "import szlib\n"
         "try:\n    szlib.SocialZone\n"
-        "except ModuleNotFoundError as error:\n    print(error)"
+        "except ModuleNotFoundError as error:\n    print(error.name, error)"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
-    assert done.stdout == "szlib.SocialZone needs polars: pip install 'szlib[data]'\n"
+    expected = "polars szlib.SocialZone needs polars: pip install 'szlib[data]'\n"
+    assert done.stdout == expected

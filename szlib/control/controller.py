@@ -197,6 +197,7 @@ STUCK_AFTER = 5.0
 PROGRESS = 0.1  # by which the way to the goal must shorten; this near, the robot is there [m] (assumed)
 CLOSING_SPEED = 0.1  # a robot that approaches its goal faster than this makes progress [m/s] (assumed)
 NEW_GOAL = 0.5  # a goal that has moved farther than this is another goal [m] (assumed)
+DETOUR = 1.0  # a way that is so much longer than before is another way [m] (assumed)
 RATE_STEPS = (
     9  # a loop has another rate than dt if most of so many steps have (assumed)
 )
@@ -308,12 +309,15 @@ class StepClock:
     ) -> float:
         """How long the robot has made no progress [s]; 0 below `STUCK_AFTER`, and while it approaches.
 
-        Progress is a shorter `remaining` way [m] than any before. A `goal` that moves far is a new one.
+        Progress is a shorter `remaining` way [m] than any before. It begins anew with a `goal` that moves
+        far, and where the way becomes a longer one, because a door has closed.
         """
         approaches = self._remaining - remaining > CLOSING_SPEED * self._elapsed
         # the clock may jump
         self._waited += min(self._elapsed, max(self._dt, OLDEST_STATE))
-        if dist(goal, self._goal) > NEW_GOAL or remaining < self._nearest - PROGRESS:
+        is_new = dist(goal, self._goal) > NEW_GOAL
+        is_new |= remaining > self._remaining + DETOUR
+        if is_new or remaining < self._nearest - PROGRESS:
             self._nearest = remaining
             self._waited = 0.0
             self._goal = goal

@@ -76,6 +76,8 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
 class Prediction:
     """Where a person will be, by a predictor; after its last time they keep their velocity.
 
+    The controller reads it at the times of its plan, and takes it as linear in between.
+
     The zone of the person grows by `SPREAD` standard deviations: along one direction, a normally distributed
     position is farther off towards the robot with a probability of 5 %.
 

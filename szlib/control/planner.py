@@ -74,7 +74,7 @@ _MULTIPLE = 16
 _FEW_ROWS = 64  # up to so many rows of obstacles, all are in the program
 _EVERY = slice(None)
 _MOST_PROBLEMS = 256  # sizes of problems for which a planner keeps what it has built
-_HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
+_HARD, _EQUAL, _SOFT = np.array([0, 5, 8], np.intc)  # DAQP's kinds of constraints
 # DAQP's answers; the second one if it violates rows with a price
 _SOLVED = 1
 _VIOLATED = 2
@@ -192,7 +192,7 @@ class Program:
         of_row = of_level[self.levels] * np.array(s.step_lengths)[k]
         self.prices[self.first :] = of_row.clip(max=HARD_PRICE)
         self._is_hard = s.decay_price == inf
-        self._sense = np.where(self.prices > 0, _SOFT, np.intc(_HARD))
+        self._sense = np.where(self.prices > 0, _SOFT, _HARD)
         self._sense[3 * s.N : self.first] = _EQUAL
         self._models = dict[Any, Any]()
 

@@ -252,9 +252,10 @@ class Step:
     def goal_blocked(self) -> bool:
         """True if the goal cannot be reached: h < 0 there, or no way leads there.
 
-        A person slower than `people.STANDING_SPEED` counts as standing. The robot waits beside them; without
-        a way it goes to the nearest point that it can reach. Ways are looked for on a map of cells, on which
-        a narrow door may be closed for a small robot although it fits: see `MPCSettings.lookahead`.
+        A person on the goal who is slower than `people.STANDING_SPEED` blocks it; the robot waits beside
+        them. People on the way do not: they may leave (see `stuck`). Where walls leave no way, the robot goes
+        to the nearest point that it can reach. Ways are looked for on a map of cells, on which a narrow door
+        may be closed for a small robot although it fits: see `MPCSettings.lookahead`.
         """
         return self.scene.goal_blocked or self.way_length == inf
 

@@ -195,7 +195,8 @@ class Map:
         numbers = np.flatnonzero(self.free)
         neighbours = numbers + (_NEIGHBOURS @ (self.shape[1], 1))[:, None]
         direction, k = self.free.ravel()[neighbours].nonzero()
-        self._pairs = np.stack([numbers[k], neighbours[direction, k]])
+        pairs = np.stack([numbers[k], neighbours[direction, k]])
+        self._pairs = pairs.astype(np.intc)  # older SciPy takes no others
         self._lengths = self.cell * np.hypot(*_NEIGHBOURS[direction].T)
 
     def _cover(self, fixed: Obstacles, slack: float) -> Mask:
@@ -305,7 +306,7 @@ class WayFinder:
         self._ways = list[Way]()
         self._goal = (inf, inf)
         self._steps = 0
-        self._n_people = 0
+        self._ids = list[Hashable]()
         self._standing: Any = None
         self._measured = self._goal
         self._loose: Map | None = None
@@ -322,14 +323,15 @@ class WayFinder:
         if m is None or not m.holds(points):
             self._loose = None
             m = self._map = self._make_map(points)
-        is_searched = not self._steps or len(people) != self._n_people
+        ids = [each.id for each in people]
+        is_searched = not self._steps or ids != self._ids
         if is_searched:
             # a robot may fit where the centres of cells are too near to walls
             if not (self._loose or m.links(points)):
                 m = self._loose = self._make_map(points, slack=0.5)
             self._search(m, at, goal, Surroundings(people, zones, at, m, self._s))
             self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
-            self._n_people = len(people)
+            self._ids = ids
         self._steps -= 1
         heading = self._head_for(m, at, self._ways[0].points)
         length = heading.length if m.is_reached else inf

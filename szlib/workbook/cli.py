@@ -207,7 +207,7 @@ def _notebooks(options: argparse.Namespace) -> int:
     """Copy the notebooks, and say how to go on."""
     from .folders import copy_notebooks
 
-    place = printable(copy_notebooks(options.folder))
+    place = shlex.quote(printable(copy_notebooks(options.folder)))
     print(
         f"{place}: szlib run --notebooks {place} runs them, jupyter lab {place} opens them"
     )

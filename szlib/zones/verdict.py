@@ -10,6 +10,8 @@ What no verdict can tell (each measured on crowds of straight walkers):
 
 - Somebody who cleans the tracks removes whole people because they come near others, or a tracker pushes two
   near estimates apart. No track ends then. "No two people pass within 0.6 m" is all that the verdict says.
+- A tracker loses people near others, and somebody then cuts 2 s or more off both ends of each track. Losses
+  are looked for up to 2 s from an end (`encounters.sensor.AHEAD`). Give the tracks as the tracker made them.
 - Streams whose *places* change during the recording avoid each other by plan: lanes or gates that change
   their direction, traffic lights. The null model moves streams in time, so it mixes places that never were
   used at once. Then p is small although nobody reacts. Give each part as a recording of its own.

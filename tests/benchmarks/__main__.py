@@ -26,11 +26,11 @@ from tqdm import tqdm
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "notebooks")]  # helpers, and studies
 
-from benchmarks import data_growth, data_sizes, measuring, steps
 from helpers.random_states import meetings, questions
 from studies.ipopt import ByIpopt
 
 import szlib
+from benchmarks import data_growth, data_sizes, measuring, steps
 from szlib.core.checks import Array
 from szlib.plaza.generation import make_plaza
 from szlib.tracks import datasets

@@ -9,10 +9,10 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import pandas as pd
-from benchmarks import measuring
 from helpers.paper_samples import PAPER_SAMPLES, paper_samples
 
 import szlib
+from benchmarks import measuring
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks.clock import to_clock

@@ -18,11 +18,11 @@ from statistics import median
 from typing import NamedTuple
 
 import polars as pl
-from benchmarks import measuring
 from helpers.paper_samples import paper_samples
 from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
+from benchmarks import measuring
 from szlib.plaza.generation import make_plaza
 from szlib.zones import outliers
 

@@ -17,10 +17,10 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from benchmarks import measuring
 from helpers.random_states import ZONE
 
 import szlib
+from benchmarks import measuring
 from szlib.control.controller import advance
 from szlib.core.checks import Array
 

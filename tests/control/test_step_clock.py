@@ -273,6 +273,19 @@ def test_a_robot_that_arrived_approaches_or_has_a_new_goal_is_not_stuck():
     )
 
 
+def test_a_robot_on_a_longer_way_is_not_stuck_because_the_shorter_one_was_closed():
+    room = [[(5, -6), (5, -0.6)], [(5, 0.6), (5, 6)], [(-3, -6), (5, -6)]]
+    settings = szlib.MPCSettings.among_people(r_robot=0.3)
+    controller, x = szlib.MPCCBF(ZONE, walls=room, settings=settings), np.zeros(4)
+    for k in range(220):
+        if k == 30:
+            controller.set_walls([*room, [(5, -0.6), (5, 0.6)]])  # the door closes
+        step = controller.step(x, (8.0, 0.0))
+        assert step.stuck == 0.0
+        x = advance(x, step.control, 0.1)
+    assert np.hypot(*(x[:2] - (8, 0))) < 0.2
+
+
 def test_a_robot_that_follows_a_goal_is_not_stuck():
     controller, x = szlib.MPCCBF(ZONE), np.zeros(4)
     for k in range(200):

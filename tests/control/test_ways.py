@@ -311,6 +311,14 @@ def test_a_goal_far_away_is_headed_for(goal) -> None:
     assert (steps[-1].predicted[0, :2] * np.sign(goal) > 0).all()
 
 
+def test_the_name_of_a_way_follows_people_who_are_listed_in_another_order() -> None:
+    ann, bob = szlib.Person((3.0, 0.1), id="ann"), szlib.Person((3.0, -4.0), id="bob")
+    controller = szlib.MPCCBF(ZONE, settings=AMONG)
+    for people in ([ann, bob], [bob, ann]):
+        step = controller.step((0.0, 0.0, 0.0, 0.0), (8.0, 0.0), people)
+        assert step.way.endswith(f"of person {people.index(ann)}")
+
+
 @pytest.mark.parametrize("away", [1e3, 1e5, 1e8])
 def test_a_map_of_any_size_has_about_as_many_cells_as_it_may(away: float) -> None:
     points = np.array([(0.0, 0.0), (away, 0.0)])

@@ -98,7 +98,8 @@ class NotebookRecord:
             self.changed["zone"] = "that of other data"
         if self.changed:
             print(
-                f"{self._settings()}: checks that assume the defaults are observations; text may not apply"
+                f"{self._settings()}: checks that assume the defaults are observations; text and sources may "
+                "not apply"
             )
         data = variables["data"]
         contents = []
@@ -113,7 +114,7 @@ class NotebookRecord:
             claim_folder(results, folders.PURPOSE)
             given = {n: v for n, v in changed.items() if n not in OPTIONS}
             self.out = folders.claim_results(results / folders.LAB, data, given)
-        for part in ("records", "figures"):
+        for part in "records", "figures":
             (self.out / part).mkdir(exist_ok=True)
         method = ZoneMethod.from_variables(variables)
         area = variables.get("area", "")

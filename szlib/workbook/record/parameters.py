@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -173,7 +174,8 @@ def _check_type(name: str, value: Any, default: Any) -> None:
     is_whole = type(default) is float and type(value) is int
     if not is_whole and type(value) is not type(default):
         raise DataError(
-            f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {value!a:.80}"
+            f"parameter {name}: expected {type(default).__name__}, such as {json.dumps(default)}; got "
+            f"{value!a:.80}"
         )
 
 
