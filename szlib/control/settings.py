@@ -58,7 +58,9 @@ class MPCSettings:
     Q, P : weights of the state (x, y, vx, vy) against the goal, on the way and at the end, >= 0.
     R : weights of the accelerations (ax, ay), > 0.
     jerk_weight : weight of the squared change of acceleration from step to step, >= 0.
-    a_max : largest |ax| and |ay| [m/s2].
+    a_max : largest |ax| and |ay| [m/s2]. A robot that stops in more time than it plans ahead, v_max / a_max,
+        drives past its goal and comes back: at 2 m/s and 0.3 m/s2 `among_people()` goes 2.5 m too far. A
+        longer `grid` helps (0.6 m with 6.6 s), a lower v_max as well.
     v_max : largest Euclidean speed [m/s]. The paper gives 1 m/s, and does not say that it is the Euclidean
         speed (assumed).
     r_robot : radius of the robot [m].
