@@ -473,7 +473,7 @@ def test_the_search_finds_the_cheapest_way_of_all() -> None:
         costs = rng.choice([0.1, 0.3, 5.0, np.inf], (7, 5, 6), p=[0.5, 0.2, 0.2, 0.1])
         far, begin = rng.uniform(0, 1, (5, 6)), (2, 3)
         costs[:, 2, 3] = 0.2
-        number = np.arange(8 * 30).reshape(8, 5, 6)
+        number = np.arange(8 * 30, dtype=np.intc).reshape(8, 5, 6)
         rows = []
         for k, i, j in np.ndindex(7, 5, 6):
             for a, b in np.ndindex(3, 3):
