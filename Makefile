@@ -12,6 +12,8 @@ INSTALLED := $(VENV)/installed
 unexport PYTHONDONTWRITEBYTECODE
 # The notebooks show their figures in every verb, and their kernels are those of .venv.
 unexport MPLBACKEND JUPYTER_PATH
+# uv trusts the certificates that the machine trusts, as pip does.
+export UV_SYSTEM_CERTS ?= 1
 
 .PHONY: run report docs slides test slow lab bench lock lowest audit hostile notebooks dist clean
 
