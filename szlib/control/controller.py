@@ -83,9 +83,8 @@ def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) ->
     lengths = np.append(held, np.full_like(slower, piece))
     moved = lengths[:, None] * (velocities[1:] + velocities[:-1]) / 2
     points = np.vstack([state[:2], moved]).cumsum(axis=0)
-    times = np.append(0.0, lengths).cumsum()
     bows = np.hypot(*(velocities[1:] - velocities[:-1]).T) * lengths / 8
-    return Path(points, times, bows)
+    return Path(points, np.append(0.0, lengths).cumsum(), bows)
 
 
 class DoubleIntegrator:

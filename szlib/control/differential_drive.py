@@ -180,8 +180,9 @@ class DriveStep(Step):
     @cached_property
     def predicted(self) -> Array:
         """(x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s]."""
-        times = self.asked.settings.times
-        states, _ = self.wheels.follow(self.own, self.planned[:, :2], times)
+        states, _ = self.wheels.follow(
+            self.own, self.planned[:, :2], self.asked.settings.times
+        )
         return states
 
     @property
@@ -191,8 +192,7 @@ class DriveStep(Step):
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, whose wheels follow the point."""
         wheels = self.wheels
-        points = way.points[::PIECES]
-        _, commands = wheels.follow(self.own, points, way.times[::PIECES])
+        _, commands = wheels.follow(self.own, way.points[::PIECES], way.times[::PIECES])
         commands[0] = self.control
         held = zip(np.repeat(commands, PIECES, axis=0), np.diff(way.times), strict=True)
         found = [self.own]

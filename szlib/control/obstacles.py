@@ -764,9 +764,11 @@ def find_bodies(
     """
     last = None if as_predicted else 9
     own = [g.numbers[:, 5:last] for g in obstacles.groups if g.kind is Zone]
-    gap = settings.r_robot + settings.body_gap
     return Obstacles(
-        tuple(Group(Body, each, np.full(len(each), gap)) for each in own),
+        tuple(
+            Group(Body, each, np.full(len(each), settings.r_robot + settings.body_gap))
+            for each in own
+        ),
         settings.r_robot,
     )
 

@@ -220,9 +220,8 @@ def linearise_motion(settings: MPCSettings) -> Any:
         scale * ca.gradient(cost, u),
         scale * cost,
     ]
-    arguments = [inputs, given, multipliers]
     dense = [ca.densify(each) for each in outputs]
-    return ca.Function("motion", arguments, dense, {"cse": True})
+    return ca.Function("motion", [inputs, given, multipliers], dense, {"cse": True})
 
 
 def bind(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> Any:

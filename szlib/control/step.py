@@ -207,8 +207,7 @@ class Step:
         """h_{k+1} - (1-gamma)^m h_k for each step of m dt of the plan, shape (obstacles, N_h) [m]."""
         s = self.asked.settings
         h = self._planned_h[:, : s.N_h + 1]
-        keep = (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h])
-        return h[:, 1:] - keep * h[:, :-1]
+        return h[:, 1:] - (1 - s.gamma) ** np.array(s.step_lengths[: s.N_h]) * h[:, :-1]
 
     @cached_property
     def _planned_h(self) -> Array:

@@ -142,8 +142,8 @@ def verify_step(step: Any) -> Report:
     at = x[:, :2], way.times[::PIECES]
     h = _measure(asked, *at, is_barrier=True)
     residual = h[:, 1:] - (1 - s.gamma) ** lengths * h[:, :-1]
-    gaps = _measure(asked, *at)
-    rows = list_rows(asked, x, h, gaps[: len(scene.people)] - s.body_gap)
+    gaps = _measure(asked, *at)[: len(scene.people)] - s.body_gap
+    rows = list_rows(asked, x, h, gaps)
     worst = _find_worst(asked, (each for each in rows if each.is_hard(s)))
     path = step.carry(way).points
     within = path[:_SAMPLES], way.times[:_SAMPLES]
@@ -152,8 +152,7 @@ def verify_step(step: Any) -> Report:
     of_zones = of_disc[: len(scene.people)].min(initial=inf) + scene.settings.eps
     if shapely.distance(scene.solids, shapely.Point(path[0])) == 0:
         gap = -inf
-    least = of_disc[:, [0, -1]].min(initial=inf)
-    lowest = float(min(least, gap, of_zones))
+    lowest = float(min(of_disc[:, [0, -1]].min(initial=inf), gap, of_zones))
     slack = max(0.0, -worst.value)
     feasible = slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and lowest >= -TOLERANCE
@@ -275,9 +274,8 @@ def _measure(
             offset = points - center
             measured = np.hypot(*offset.T) - BODY_RADIUS
             if is_barrier:
-                zone = scene.person_zones[i]
-                heading = person.heading or 0.0
-                measured = _measure_zone(offset, heading, zone) - growth
+                facing = person.heading or 0.0
+                measured = _measure_zone(offset, facing, scene.person_zones[i]) - growth
         elif type(each) in (Wall, PaperWall):
             is_paper = is_barrier and isinstance(each, PaperWall)
             measured = _measure_wall(points, each, is_paper)

@@ -226,8 +226,7 @@ def walls_from_grid(
     # edges come in pairs: where a run of occupied cells begins, and where it ends
     row, edge = np.diff(cells, prepend=False, append=False).nonzero()
     low = row[::2]
-    runs = shapely.box(edge[::2], low, edge[1::2], low + 1)
-    outlines = shapely.union_all(runs)
+    outlines = shapely.union_all(shapely.box(edge[::2], low, edge[1::2], low + 1))
     c = side * cos(yaw)
     s = side * sin(yaw)
     turn = [c, -s, s, c, x, y]
