@@ -124,8 +124,9 @@ class DataCache:
         content = load_cached(self._path("encounters.parquet"), self.source())
         if content:
             return pd.read_parquet(io.BytesIO(content))
-        samples = find_encounters(self.tracks(), settings=self.settings)
-        return self.store_encounters(samples)
+        return self.store_encounters(
+            find_encounters(self.tracks(), settings=self.settings)
+        )
 
     def store_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Store the `samples` of encounters for later notebooks, and return them.
@@ -166,8 +167,9 @@ class DataCache:
 
     def null_model(self) -> NullEncounters | None:
         """The null model of the encounters, as from `find_null_model`."""
-        r_max = self.method.r_max
-        return find_null_model(self.tracks(), settings=self.settings, r_max=r_max)
+        return find_null_model(
+            self.tracks(), settings=self.settings, r_max=self.method.r_max
+        )
 
     def ellipse(self) -> Ellipse:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
