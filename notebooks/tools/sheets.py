@@ -48,7 +48,8 @@ Run these commands in this folder; students need szlib, lecturers szlib and nbgr
 4. `nbgrader export --to grades.csv` writes the points: one a minute of each task that passes.
 5. Grade the essay of each sheet by its rubric: `nbgrader formgrader` in JupyterLab shows it beside the answer.
 6. For marks that count: `python JUDGES submitted/*/*/*.ipynb --out marks.csv`, with your folder `judges`. It takes the
-   functions from the text of the sheets; what a sheet does to its own judges has no effect.
+   functions from the text of the sheets, with the imports, definitions and constants that they use. What a sheet does
+   to its own judges has no effect, and experiments cost no points. Each task has a row, with the reason for no points.
 7. `nbgrader generate_feedback SHEET` writes `feedback/STUDENT/SHEET/SHEET.html`.
 """
 

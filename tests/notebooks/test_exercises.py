@@ -13,6 +13,7 @@ import warnings
 from dataclasses import replace
 
 import judges
+import jupytext
 import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
@@ -22,6 +23,7 @@ from helpers.cheats import CHEATS
 from helpers.exercises import TASKS, cells, defined, judge, solution
 from helpers.wrong_answers import WRONG
 from judges import SHEETS, Task, check, hint
+from judges.__main__ import mark_sheet
 from judges.answers import Answer, pack
 from judges.task import load_texts
 
@@ -309,7 +311,9 @@ def test_what_a_notebook_does_to_its_judges_changes_nothing(tmp_path):
     minutes = TASKS["speed_limit"][2].minutes
     assert f"{sheet}: {minutes} points" in done.stdout
     marks = pd.read_csv(table).set_index("task")["points"].to_dict()
-    assert marks == {"velocity": 0, "speed_limit": minutes}
+    tasks = [*SHEETS["sheet1_tracks"], *SHEETS["sheet4_own_zone"]]
+    expected = dict.fromkeys((task.name for task in tasks), 0)
+    assert marks == expected | {"speed_limit": minutes}
 
 
 @pytest.mark.slow
@@ -321,6 +325,89 @@ def test_the_command_that_marks_gives_a_solved_sheet_all_its_points():
     points = sum(task.minutes for task in SHEETS["sheet1_tracks"])
     assert f"{sheet}: {points} points" in done.stdout
     assert "import matplotlib" in sheet.read_text(encoding="utf-8")
+
+
+def solved_sheet(file, edit):
+    """Write the solved sheet 1 with its cells edited, and return its path."""
+    notebook = jupytext.read(sheets.SOLUTIONS / "sheet1_tracks.ipynb")
+    edit(notebook.cells)
+    jupytext.write(notebook, file)
+    return file
+
+
+def test_what_a_sheet_does_beside_its_answers_costs_no_points(tmp_path):
+    def edit(sheet):
+        for cell in sheet:
+            if cell.source.startswith("import judges\n"):
+                cell.source = "%matplotlib inline\n" + cell.source
+            if cell.source.startswith("def velocity"):
+                cell.source = "%%time\n" + cell.source
+            if cell.source.startswith("def line_of_sight"):
+                cell.source = "%precision 3\n" + cell.source
+            if cell.source.startswith("def one_hertz"):
+                cell.source = (
+                    "one_hertz = lambda radius, speed, interval: "
+                    "radius * (1 - np.cos(speed * interval / radius / 2))"
+                )
+        for source in (
+            "plt.plot([0, 1])\nplt.savefig('mine.png')",
+            "import pandas as pd\ntracks = pd.read_csv('tracks.csv')",
+            "import time\ntime.sleep(25)",
+            "path = pd.read_csv('path.csv')  # the name of an argument",
+        ):
+            sheet.append(nbformat.v4.new_code_cell(source))
+
+    rows = mark_sheet(solved_sheet(tmp_path / "sheet.ipynb", edit), 1)
+    expected = {task.name: task.minutes for task in SHEETS["sheet1_tracks"]}
+    assert {row["task"]: row["points"] for row in rows} == expected, rows
+
+
+def test_each_task_of_a_sheet_has_a_row_with_the_reason(tmp_path):
+    def edit(sheet):
+        for cell in sheet:
+            if cell.source.startswith("def velocity"):
+                cell.source = "def velocity(path, k, half)\n    return 0"
+            if cell.source.startswith("def line_of_sight"):
+                cell.source = "line_of_sight = 3.0"
+            if cell.source.startswith("def in_space"):
+                cell.source = "in_space = unknown(3)"
+
+    rows = mark_sheet(solved_sheet(tmp_path / "sheet.ipynb", edit), 1)
+    said = {row["task"]: row["message"] for row in rows}
+    assert re.search(
+        r"the sheet defines no velocity; not Python: .*cell \d+, line 1",
+        said["velocity"],
+    )
+    assert "line_of_sight is a float; expected a function" in said["line_of_sight"]
+    assert "name 'unknown' is not defined" in said["in_space"]
+    assert "correct" in said["one_hertz"]
+    assert [bool(row["points"]) for row in rows] == [False, False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("before", "value"),
+    [
+        ("one = 1.0", "one"),
+        ("import numpy\nfrom math import *\none = numpy.exp(0) * cos(0)", "one"),
+        ("from math import *", "cos(0)"),
+        ("ones = []\nfor i in range(3):\n    ones.append(1.0)", "ones[2]"),
+        ("ones = {}\nones['a'] = 0.0\nones['a'] += 1", "ones['a']"),
+        ("def own():\n    return Two().half\nclass Two:\n    half = 2 / 2", "own()"),
+        ("try:\n    from none import one\nexcept ImportError:\n    one = 1.0", "one"),
+    ],
+)
+def test_an_answer_has_the_names_of_the_sheet_that_it_uses(before, value):
+    source = (
+        f"def speed_limit(h, gamma, dt, v):\n    return {value} * gamma * h / dt - v"
+    )
+    (verdict,) = judge("speed_limit", f"{before}\n{source}", [SEED])
+    assert verdict.passed, verdict
+
+
+def test_a_file_that_an_answer_needs_is_not_read():
+    source = "text = open('one.txt').read()\ndef speed_limit(*_):\n    return len(text)"
+    (verdict,) = judge("speed_limit", source, [SEED])
+    assert "reads a file" in verdict.message
 
 
 def test_the_command_that_marks_names_a_sheet_that_is_missing(tmp_path):

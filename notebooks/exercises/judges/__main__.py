@@ -2,8 +2,9 @@
 
     python notebooks/exercises/judges FILE.ipynb ... [--seed 7] [--out marks.csv]
 
-Each function of a sheet is taken from the text of its cells, and runs in a process of its own. Nothing that the
-sheet does to its own judges counts. `serve` in place of the files answers the checks of a notebook.
+Each function of a sheet is taken from the text of its cells, with the imports, definitions and constants that it
+uses, and runs in a process of its own. Nothing that the sheet does to its own judges counts, and no experiment in
+it costs points. `serve` in place of the files answers the checks of a notebook.
 """
 
 from __future__ import annotations
@@ -13,49 +14,68 @@ import csv
 import json
 import re
 import secrets
+import symtable
 import sys
 from pathlib import Path
 
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
+COLUMNS = ("file", "sheet", "task", "points", "of", "message")
 
-def read_source(file: Path) -> str:
-    """The code of a sheet: its cells that are Python, one after the other."""
-    import ast
 
+def read_source(file: Path) -> tuple[str, list[str]]:
+    """The code of a sheet, its cells one after the other, and what is wrong with the cells that are left out."""
     import jupytext
 
-    sources = []
-    for cell in jupytext.read(file).cells:
+    sources, faults = [], []
+    for number, cell in enumerate(jupytext.read(file).cells, 1):
         if cell.cell_type == "code":
+            source = translate_magics(cell.source)
             try:
-                ast.parse(cell.source)
-            except (SyntaxError, ValueError):
-                continue  # a command of IPython, or a cell that does not run either
-            sources.append(cell.source)
-    return "\n\n".join(sources)
+                symtable.symtable(source, f"cell {number}", "exec")
+            except (SyntaxError, ValueError) as error:
+                faults.append(f"not Python: {error}")
+            else:
+                sources.append(source)
+    return "\n\n".join(sources), faults
+
+
+def translate_magics(source: str) -> str:
+    """The Python of a cell of IPython, without magics of the whole cell, such as `%%time`."""
+    from IPython.core.inputtransformer2 import TransformerManager
+
+    while source.lstrip().startswith("%%"):
+        source = source.lstrip().partition("\n")[2]
+    return TransformerManager().transform_cell(source)  # type: ignore[no-untyped-call]
+
+
+def find_sheets(source: str) -> list[str]:
+    """The sheets whose tasks the code checks; without checks, those whose functions it defines."""
+    from judges.sheets import SHEETS
+
+    for pattern in (r"\bcheck\(\s*[\"'](\w+)", r"^def (\w+)\("):
+        names = set(re.findall(pattern, source, re.MULTILINE))
+        if found := [sheet for sheet, tasks in SHEETS.items() if names & {task.name for task in tasks}]:
+            return found
+    return []
 
 
 def mark_sheet(file: Path, seed: int) -> list[dict[str, object]]:
     """A row for each task of the sheet: its points, and what the judge says."""
     from judges.sheets import SHEETS, judge
 
-    source = read_source(file)
+    source, faults = read_source(file)
     rows: list[dict[str, object]] = []
-    for sheet, tasks in SHEETS.items():
-        for task in tasks:
-            if re.search(rf"^def {task.name}\(", source, re.MULTILINE):
-                verdict = judge(task.name, {"source": source, "name": task.name}, seed)
-                points = task.minutes if verdict.passed else 0
-                message = " ".join(verdict.message.split())
-                row = {
-                    "file": str(file),
-                    "sheet": sheet,
-                    "task": task.name,
-                    "points": points,
-                }
-                rows.append(row | {"of": task.minutes, "message": message[:300]})
+    for sheet in find_sheets(source):
+        for task in SHEETS[sheet]:
+            verdict = judge(task.name, {"source": source, "name": task.name}, seed)
+            points = task.minutes if verdict.passed else 0
+            message = " ".join(verdict.message.split())[:300]
+            if not verdict.passed:
+                message = "; ".join([message, *faults])
+            values = (str(file), sheet, task.name, points, task.minutes, message)
+            rows.append(dict(zip(COLUMNS, values, strict=True)))
     return rows
 
 

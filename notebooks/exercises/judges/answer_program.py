@@ -10,6 +10,7 @@ each call, and stands for nothing more than the result of that call. This keeps 
 
 from __future__ import annotations
 
+import ast
 import base64
 import contextlib
 import importlib
@@ -17,6 +18,7 @@ import json
 import os
 import pickle
 import struct
+import symtable
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -145,22 +147,81 @@ def limit(seconds: float) -> None:
 
 
 def define(given: dict[str, str]) -> Callable[..., Any]:
-    """The learner's function: unpickled, or defined by the statements of its source that can be executed."""
+    """The learner's function: unpickled, or defined by the statements of its source that it needs."""
     if "pickle" in given:
         loaded: Callable[..., Any] = pickle.loads(base64.b64decode(given["pickle"]))
         return loaded
-    import ast
-
+    name = given["name"]
+    failure: BaseException = NotImplementedError(f"the sheet defines no {name}")
     space: dict[str, Any] = {"__name__": "sheet"}
-    for statement in ast.parse(given["source"]).body:
+    for statement in find_needed(given["source"], name):
         try:
             exec(compile(ast.Module([statement], []), "sheet", "exec"), space)
-        except (Exception, SystemExit):
-            continue  # what the function needs of it is missing, and said when the function runs
-    if given["name"] not in space:
-        raise NotImplementedError
-    found: Callable[..., Any] = space[given["name"]]
+        except (Exception, SystemExit) as error:
+            failure = error  # if the function is defined, it says what it misses when it runs
+    if name not in space:
+        raise failure
+    found: Callable[..., Any] = space[name]
+    if not callable(found):
+        raise NotImplementedError(f"{name} is a {type(found).__name__}; expected a function")
     return found
+
+
+def find_needed(source: str, name: str) -> list[ast.stmt]:
+    """The statements that define or change `name`, and the names of the sheet that it uses, in order.
+
+    Other statements, such as experiments, figures and checks, can neither fail, take time nor read files.
+    """
+    statements = ast.parse(source).body
+    tables = [symtable.symtable(ast.unparse(each), "sheet", "exec") for each in statements]
+    symbols = [symbol for table in tables for symbol in table.get_symbols()]
+    imported = {symbol.get_name() for symbol in symbols if symbol.is_imported()}
+    parts = [
+        (statement, find_defined(table) | (find_changed(statement) - imported), find_used(table))
+        for statement, table in zip(statements, tables, strict=True)
+    ]
+    needed, n_before = {name, "*"}, 0
+    while len(needed) > n_before:
+        n_before = len(needed)
+        for _, defined, used in parts:
+            if defined & needed:
+                needed |= used
+    return [statement for statement, defined, _ in parts if defined & needed]
+
+
+def find_defined(table: symtable.SymbolTable) -> set[str]:
+    """The names that a statement assigns, imports, or defines as a function or a class."""
+    symbols = table.get_symbols()
+    return {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
+
+
+def find_changed(statement: ast.stmt) -> set[str]:
+    """The names whose objects a statement changes: `a[0] = 1`, `a.x = 1`, `a.append(1)`; "*" for all names."""
+    if isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+        return set()
+    found = set()
+    for node in ast.walk(statement):
+        match node:
+            case ast.alias(name="*"):
+                found.add("*")
+            case ast.Attribute(ctx=ast.Store()) | ast.Subscript(ctx=ast.Store()):
+                found.add(find_base(node))
+            case ast.Expr(value=ast.Call(func=ast.Attribute() as method)):
+                found.add(find_base(method))
+    return found
+
+
+def find_base(node: ast.expr) -> str:
+    """The name before the dots and brackets of an expression; "" if there is none."""
+    while isinstance(node, (ast.Attribute, ast.Subscript)):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def find_used(table: symtable.SymbolTable) -> set[str]:
+    """The names of the sheet that a statement uses, also in its functions."""
+    used = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
+    return used.union(*map(find_used, table.get_children()))
 
 
 def encode(got: Any) -> dict[str, Any]:

@@ -166,8 +166,8 @@ def _decode(found: dict[str, Any]) -> Any:
     match found:
         case {"refused": str(text)}:
             raise Refusal(text)
-        case {"error": "NotImplementedError"}:
-            raise NotImplementedError
+        case {"error": "NotImplementedError", "text": text}:
+            raise NotImplementedError(text)
         case {"error": "Infeasible", "text": text}:
             raise Infeasible(text)
         case {"error": str(kind), "text": text}:

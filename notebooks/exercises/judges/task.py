@@ -88,8 +88,9 @@ class Task:
                 calls.append([])
                 found = self._run(answer, args, calls[-1])
                 fault = fault or (f"{found}{self._replay(args, seed, number)}" if found else "")
-        except NotImplementedError:
-            return Verdict(self.name, False, "no answer yet: write it, then run this cell")
+        except NotImplementedError as error:
+            reason = str(error) or "write it, then run this cell"
+            return Verdict(self.name, False, f"no answer yet: {reason}")
         except (Refusal, Failure) as error:
             return Verdict(self.name, False, f"{error}{self._replay(args, seed, number)}")
         for case, made in enumerate(calls, 1):
