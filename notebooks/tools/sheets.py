@@ -49,7 +49,8 @@ Run these commands in this folder; students need szlib, lecturers szlib and nbgr
 5. Grade the essay of each sheet by its rubric: `nbgrader formgrader` in JupyterLab shows it beside the answer.
 6. For marks that count: `python JUDGES submitted/*/*/*.ipynb --out marks.csv`, with your folder `judges`. It takes the
    functions from the text of the sheets, with the imports, definitions and constants that they use. What a sheet does
-   to its own judges has no effect, and experiments cost no points. Each task has a row, with the reason for no points.
+   to its own judges has no effect, and experiments cost no points. Each task has a row, with the reason for no points;
+   so has a file that cannot be read.
 7. `nbgrader generate_feedback SHEET` writes `feedback/STUDENT/SHEET/SHEET.html`.
 """
 

@@ -11,8 +11,10 @@ import sys
 import time
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import judges
+import judges.__main__ as marking
 import jupytext
 import matplotlib.pyplot as plt
 import nbformat
@@ -23,7 +25,6 @@ from helpers.cheats import CHEATS
 from helpers.exercises import TASKS, cells, defined, judge, solution
 from helpers.wrong_answers import WRONG
 from judges import SHEETS, Task, check, hint
-from judges.__main__ import mark_sheet
 from judges.answers import Answer, pack
 from judges.task import load_texts
 
@@ -357,7 +358,7 @@ def test_what_a_sheet_does_beside_its_answers_costs_no_points(tmp_path):
         ):
             sheet.append(nbformat.v4.new_code_cell(source))
 
-    rows = mark_sheet(solved_sheet(tmp_path / "sheet.ipynb", edit), 1)
+    rows = marking.mark_sheet(solved_sheet(tmp_path / "sheet.ipynb", edit), 1)
     expected = {task.name: task.minutes for task in SHEETS["sheet1_tracks"]}
     assert {row["task"]: row["points"] for row in rows} == expected, rows
 
@@ -372,7 +373,7 @@ def test_each_task_of_a_sheet_has_a_row_with_the_reason(tmp_path):
             if cell.source.startswith("def in_space"):
                 cell.source = "in_space = unknown(3)"
 
-    rows = mark_sheet(solved_sheet(tmp_path / "sheet.ipynb", edit), 1)
+    rows = marking.mark_sheet(solved_sheet(tmp_path / "sheet.ipynb", edit), 1)
     said = {row["task"]: row["message"] for row in rows}
     assert re.search(
         r"the sheet defines no velocity; not Python: .*cell \d+, line 1",
@@ -410,10 +411,60 @@ def test_a_file_that_an_answer_needs_is_not_read():
     assert "reads a file" in verdict.message
 
 
+def run_marks(*arguments):
+    command = [sys.executable, sheets.EXERCISES / "judges", *arguments]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+def test_files_that_cannot_be_marked_have_a_row_and_stop_no_other(tmp_path):
+    sources = {
+        "a_conflict.ipynb": b"<<<<<<< HEAD",
+        "b_latin.py": "# %%\ngröße = 1".encode("latin-1"),
+        "c_empty.ipynb": b"",
+        "d_letter.txt": b"Dear professor",
+        "e_other.py": b"x = 1",
+        "f_answer.py": b"def speed_limit(h, gamma, dt, v):\n    return gamma * h / dt - v",
+    }
+    for name, source in sources.items():
+        (tmp_path / name).write_bytes(source)
+    table = tmp_path / "marks.csv"
+    done = run_marks(*sorted(tmp_path.iterdir()), "--seed", "1", "--out", table)
+    assert done.returncode == 0, done.stderr
+    marks = pd.read_csv(table)
+    said = marks[marks["task"].isna()].set_index("file")["message"]
+    assert [Path(name).name for name in said.index] == list(sources)[:-1]
+    assert said.str.startswith("not marked: ").all()
+    for reason, message in zip(
+        ("NotJSONError", "UnicodeDecodeError", "NotJSONError", "", "no task"),
+        said,
+        strict=True,
+    ):
+        assert reason in message and message[12:] in done.stdout
+    solved = marks.set_index("task").loc["speed_limit"]
+    assert solved["points"] == solved["of"] == TASKS["speed_limit"][2].minutes
+
+
+def test_an_interruption_keeps_the_rows_of_the_sheets_before(tmp_path, monkeypatch):
+    def mark(file, seed):
+        if file.name == "second.py":
+            raise KeyboardInterrupt
+        row = dict.fromkeys(marking.COLUMNS, "") | {"file": file, "points": 5}
+        return [row]
+
+    monkeypatch.setattr(marking, "mark_sheet", mark)
+    table = tmp_path / "marks.csv"
+    with pytest.raises(
+        SystemExit, match=r"interrupted: second\.py and the files after"
+    ):
+        marking.mark_sheets([Path("first.py"), Path("second.py")], 1, table)
+    assert pd.read_csv(table)["file"].tolist() == ["first.py"]
+
+
 def test_the_command_that_marks_names_a_sheet_that_is_missing(tmp_path):
-    command = [sys.executable, sheets.EXERCISES / "judges", tmp_path / "none.ipynb"]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = run_marks(tmp_path / "none.ipynb")
     assert done.returncode == 2 and "none.ipynb: no such file" in done.stderr
+    done = run_marks(Path(__file__), "--out", tmp_path / "none" / "marks.csv")
+    assert done.returncode == 2 and "none: no such folder" in done.stderr
 
 
 # --- the closed loop ---------------------------------------------------------------------------------

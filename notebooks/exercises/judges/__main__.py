@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import os
 import re
 import secrets
 import symtable
@@ -66,7 +67,7 @@ def mark_sheet(file: Path, seed: int) -> list[dict[str, object]]:
     from judges.sheets import SHEETS, judge
 
     source, faults = read_source(file)
-    rows: list[dict[str, object]] = []
+    rows = []
     for sheet in find_sheets(source):
         for task in SHEETS[sheet]:
             verdict = judge(task.name, {"source": source, "name": task.name}, seed)
@@ -76,7 +77,35 @@ def mark_sheet(file: Path, seed: int) -> list[dict[str, object]]:
                 message = "; ".join([message, *faults])
             values = (str(file), sheet, task.name, points, task.minutes, message)
             rows.append(dict(zip(COLUMNS, values, strict=True)))
+    if not rows:
+        expected = "expected `judges.check(...)` or a function of a task"
+        raise ValueError("; ".join([f"no task of a sheet is found; {expected}", *faults]))
     return rows
+
+
+def mark_sheets(files: list[Path], seed: int, out: Path) -> None:
+    """Mark the sheets, print the marks, and write them to a table, which is complete after each sheet."""
+    from judges.answers import end_programs
+
+    with out.open("w", newline="", encoding="utf-8") as table:
+        writer = csv.DictWriter(table, COLUMNS)
+        writer.writeheader()
+        for file in files:
+            try:
+                rows = mark_sheet(file, seed)
+            except Exception as error:  # one file that cannot be marked must not stop the others
+                reason = " ".join(f"not marked: {type(error).__name__}: {error}".split())[:300]
+                rows = [dict(zip(COLUMNS, (str(file), "", "", 0, 0, reason), strict=True))]
+            except KeyboardInterrupt:
+                raise SystemExit(f"interrupted: {file} and the files after it are not marked") from None
+            finally:
+                end_programs()  # nothing of a student's answers is there when those of the next one run
+            writer.writerows(rows)
+            table.flush()
+            print(f"{file}: {sum(int(str(row['points'])) for row in rows)} points")
+            for row in rows:
+                text = ": ".join(str(row[column]) for column in ("task", "message") if row[column])
+                print(f"    {row['points']:>3} of {row['of']:>3}  {text}", flush=True)
 
 
 def serve() -> None:
@@ -99,8 +128,6 @@ def main() -> None:
     if sys.argv[1:] == ["serve"]:
         serve()
         return
-    from judges.answers import end_programs
-
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("files", nargs="+", type=Path, help="sheets, .ipynb or .py")
     parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6), help="default: a new one")
@@ -109,20 +136,10 @@ def main() -> None:
     for file in given.files:
         if not file.is_file():
             parser.error(f"{file}: no such file; expected a sheet, .ipynb or .py")
-    rows = []
-    for file in given.files:
-        marks = mark_sheet(file, given.seed)
-        end_programs()  # nothing of a student's answers is there when those of the next one run
-        rows += marks
-        print(f"{file}: {sum(int(str(row['points'])) for row in marks)} points")
-        for row in marks:
-            print(f"    {row['points']:>3} of {row['of']:>3}  {row['task']}: {row['message']}")
+    if given.out and not given.out.parent.is_dir():
+        parser.error(f"{given.out.parent}: no such folder; make it first")
+    mark_sheets(given.files, given.seed, given.out or Path(os.devnull))
     print(f"--seed {given.seed} draws the same cases again")
-    if given.out and rows:
-        with given.out.open("w", newline="", encoding="utf-8") as table:
-            writer = csv.DictWriter(table, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
 
 
 if __name__ == "__main__":
