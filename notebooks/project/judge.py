@@ -101,7 +101,8 @@ def make_board(table: pd.DataFrame) -> pd.DataFrame:
     reasons = table["meeting"] + ": " + table["refused"].replace(r"[|\s]+", " ", regex=True)
     board["refused"] = reasons[table["refused"] != ""].groupby(table["controller"]).agg("; ".join)
     board = board.fillna({"refused": ""}).sort_values("points", ascending=False, kind="stable").reset_index()
-    return board.round({"points": 1, "time_to_goal": 1, "time_in_zones": 1, "gap_to_people": 2})
+    board.insert(1, "result", [score(points, board) for points in board["points"]])
+    return board.round({"result": 1, "points": 1, "time_to_goal": 1, "time_in_zones": 1, "gap_to_people": 2})
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -129,6 +130,7 @@ def main(arguments: list[str] | None = None) -> None:
     rows = [judge(*each, meeting, seeds, given.time_limit) for each, meeting in tasks]
     table = pd.DataFrame(rows)
     board = make_board(table)
+    table.insert(2, "result", table["controller"].map(board.set_index("controller")["result"]))
     cells = board.map(lambda value: "" if pd.isna(value) else str(value)).to_numpy()
     lines = [board.columns, ["---"] * len(board.columns), *cells]
     lines = [f"| {' | '.join(line)} |" for line in lines]

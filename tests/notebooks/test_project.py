@@ -164,6 +164,39 @@ def test_the_result_is_a_distance_to_the_rivals():
     assert scores == [0, 0, 10, 20, 25, 30, 30]
 
 
+def test_the_board_has_the_result_of_each_controller(tmp_path, monkeypatch, capsys):
+    """One mark a controller, from its mean points over the meetings; also in each of its rows of the CSV."""
+    points = {"rivals/paper": 40.0, "rivals/tuned": 60.0, "mine": 50.0, "best": 70.0}
+    rest = {"time_to_goal": 20.0, "time_in_zones": 0.0, "gap_to_people": 0.5}
+
+    def judge(name, source, meeting, seeds, time_limit):
+        shift = 5.0 if meeting == "overtaking" else 0.0
+        row = {"controller": name, "meeting": meeting, "points": points[name] + shift}
+        return row | rest | {"refused": ""}
+
+    monkeypatch.setattr(judging, "judge", judge)
+    monkeypatch.setattr(
+        judging, "read_submissions", lambda _: dict.fromkeys(points, "")
+    )
+    judging.main(["--out", str(tmp_path)])
+    head, _, *rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in capsys.readouterr().out.splitlines()
+        if line.startswith("|")
+    ]
+    found = {row[0]: float(row[head.index("result")]) for row in rows}
+    assert list(found) == ["best", "rivals/tuned", "mine", "rivals/paper"]
+    low, best = 40 + 5 / len(szlib.MEETINGS), 60 + 5 / len(szlib.MEETINGS)
+    beyond = 20 + 10 * min(1, 10 / (0.25 * (100 - best)))
+    expected = {"best": beyond, "rivals/tuned": 20, "mine": 10, "rivals/paper": 0}
+    assert best - low == pytest.approx(20)
+    assert found == pytest.approx(expected, abs=0.05)
+    table = pd.read_csv(tmp_path / "board.csv")
+    assert table.groupby("controller")["result"].unique().map(list).to_dict() == {
+        name: [value] for name, value in found.items()
+    }
+
+
 EDIT = """
 import szlib
 import szlib.simulation.metrics
@@ -265,6 +298,7 @@ def test_the_template_runs_as_it_is_and_is_not_refused(run, tmp_path):
 
 def test_the_assignment_states_the_rules_of_the_judge():
     text = (PROJECT / "README.md").read_text(encoding="utf-8")
+    assert "column `result` of the board" in text
     missing = [
         link
         for link in re.findall(r"\]\((?!http)([^)#]+)\)", text)
