@@ -127,7 +127,7 @@ judges.check("triangle_ellipse", triangle_ellipse)
 def quantile_radius(nearest, q):
     """Radius of the quantile zone in this direction [m]."""
     ### BEGIN SOLUTION
-    return np.sort(nearest)[int(np.ceil(q * len(nearest))) - 1]
+    return min(radius for radius in nearest if np.mean(nearest <= radius) >= q)
     ### END SOLUTION
 
 

@@ -5,6 +5,7 @@
 
 import doctest
 import importlib.util
+import math
 import re
 import subprocess
 import sys
@@ -247,6 +248,16 @@ def test_an_answer_that_calls_szlib_or_the_judges_is_refused():
         )
     verdict = check("wall_distance", szlib.segment_distance)
     assert "no answer: this uses szlib" in verdict.message
+
+
+def test_the_quantile_of_the_task_and_its_count_agree_in_every_case():
+    """q n is not rounded across a whole number: n = 50 with q = 0.28 gave 14.000000000000002."""
+    task = TASKS["quantile_radius"][2]
+    for seed in range(200):
+        for nearest, q in task.cases(np.random.default_rng(seed)):
+            literal = next(r for r in np.sort(nearest) if np.mean(nearest <= r) >= q)
+            counted = np.sort(nearest)[math.ceil(q * len(nearest)) - 1]
+            assert literal == counted == task.solution(nearest, q), (seed, q)
 
 
 def test_an_answer_cannot_change_the_case():

@@ -10,16 +10,18 @@ from .task import Args, Rng, make_task, repeat
 
 
 def _draw_approaches(rng: Rng) -> Args:
-    """Approaches of which a share q is a whole number in half of the cases."""
+    """Approaches of which a share q is a whole number in half of the cases, and far from one in the others."""
     if rng.random() < 0.5:  # powers of two: q n is exact
         n, q = 32 * int(rng.integers(1, 3)), int(rng.integers(2, 9)) / 32
-    else:
-        n, q = int(rng.integers(40, 60)), round(rng.uniform(0.04, 0.3), 3)
+    else:  # at least 0.07 from a whole number: the rounding of q n does not matter
+        n = int(rng.integers(40, 60))
+        q = round((int(rng.integers(2, 12)) + rng.uniform(0.1, 0.9)) / n, 3)
     return (0.8 + rng.exponential(0.3, n)).round(3), q
 
 
 def _quantile(nearest: Any, q: float) -> Any:
-    return np.quantile(nearest, q, method="inverted_cdf")
+    """The least approach such that at least a share q came as near as that, or nearer."""
+    return min(radius for radius in nearest if np.mean(nearest <= radius) >= q)
 
 
 def _draw_mean_distance(rng: Rng) -> Args:
