@@ -6,11 +6,13 @@
 
 The exercises are made from the solutions. The code between `### BEGIN SOLUTION` and `### END SOLUTION` is
 replaced by the stub of nbgrader, a cell that begins with "**Rubric**" by a place for the essay, and cells
-that begin with "**Solution.**" are left out. nbgrader is not among the packages of the workbook: `pip install
-nbgrader` first.
+that begin with "**Solution.**" are left out. The sheets of a class have no links to other files of szlib, which its
+students need not have. nbgrader is not among the packages of the workbook: `pip install nbgrader` first.
 """
 
 import argparse
+import importlib.util
+import os
 import re
 import shutil
 import subprocess
@@ -34,6 +36,8 @@ REMARK = re.compile(
 )
 RUBRIC = re.compile(r"^# \*\*Rubric\*\*.*(?:\n#.*)*", re.MULTILINE)
 CHECK = re.compile(r'^judges\.check\("(\w+)", \w+\)$')
+LOCAL_LINK = re.compile(r"\[([^]]*)\]\((?!https?:)[^)]*\)")
+NAVIGATION = re.compile(r"^\[Start\].*\[solved\]\([^)]*\)\s·\s(.*?)\sbelongs\sto\s", re.DOTALL)
 CONFIG = """c = get_config()
 c.CourseDirectory.course_id = "szlib"
 c.ExecutePreprocessor.timeout = 120
@@ -65,6 +69,9 @@ def make_graded(solutions: str, points: dict[str, int]) -> nbformat.NotebookNode
     from judges import ESSAY_MINUTES
 
     sheet = jupytext.reads(REMARK.sub("", solutions), fmt="py:percent")
+    for cell in sheet.cells:
+        if cell.cell_type == "markdown":
+            cell.source = remove_local_links(cell.source)
     for cell, after in zip(sheet.cells, [*sheet.cells[1:], None], strict=True):
         if after is not None and (task := CHECK.match(after.source)):
             cell.metadata["nbgrader"] = _nbgrader_metadata(f"{task[1]}-answer", solution=True)
@@ -76,6 +83,11 @@ def make_graded(solutions: str, points: dict[str, int]) -> nbformat.NotebookNode
             mark = _nbgrader_metadata("essay", solution=True, grade=True)
             cell.metadata["nbgrader"] = mark | {"points": ESSAY_MINUTES, "locked": False}
     return sheet
+
+
+def remove_local_links(text: str) -> str:
+    """The text of a cell without links to files; of a navigation cell, the time and the chapters remain."""
+    return LOCAL_LINK.sub(r"\1", NAVIGATION.sub(r"\1 chapters: ", text))
 
 
 def _nbgrader_metadata(name: str, *, solution: bool = False, grade: bool = False) -> dict[str, object]:
@@ -118,6 +130,10 @@ def make_course(folder: Path) -> None:
     """Write a course of nbgrader into `folder`; nbgrader then makes the sheets for students, `release/`."""
     from judges import SHEETS
 
+    if importlib.util.find_spec("nbgrader") is None:
+        raise SystemExit(
+            "nbgrader is not installed; run `pip install nbgrader` in the environment of szlib first"
+        )
     for name, tasks in SHEETS.items():
         place = folder / "source" / name
         place.mkdir(parents=True, exist_ok=True)
@@ -126,9 +142,11 @@ def make_course(folder: Path) -> None:
         jupytext.write(sheet, place / f"{name}.ipynb")
         shutil.copytree(JUDGES, place / "judges", dirs_exist_ok=True, ignore=UNNEEDED)
     (folder / "nbgrader_config.py").write_text(CONFIG, encoding="utf-8")
+    programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     for name in SHEETS:
         command = ["-m", "nbgrader", "generate_assignment", name, "--create", "--force"]
-        subprocess.run([sys.executable, *command], cwd=folder, check=True)
+        where = {"cwd": folder, "env": os.environ | {"PATH": programs}}  # nbgrader starts alembic by its name
+        subprocess.run([sys.executable, *command], check=True, **where)
     (folder / "README.md").write_text(LECTURER, encoding="utf-8")
     print(
         f"{folder / 'release'} holds the sheets for students; {folder / 'README.md'} says how to grade them"

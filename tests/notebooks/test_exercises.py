@@ -6,6 +6,7 @@
 import doctest
 import importlib.util
 import math
+import os
 import re
 import subprocess
 import sys
@@ -588,5 +589,41 @@ class TestSheet:
             solutions, {task.name: task.minutes for task in SHEETS[sheet]}
         )
         released = preprocessors.ClearSolutions().preprocess(source, {})[0].cells
-        expected = [cell.source for cell in cells(sheets.EXERCISES / f"{sheet}.py")]
+        expected = [
+            sheets.remove_local_links(cell.source)
+            for cell in cells(sheets.EXERCISES / f"{sheet}.py")
+        ]
         assert [cell.source.removesuffix(".require()") for cell in released] == expected
+
+    def test_the_sheet_of_a_class_has_no_link_to_a_file(self, sheet):
+        """Its students have neither the chapters nor the solutions beside it."""
+        solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
+        points = {task.name: task.minutes for task in SHEETS[sheet]}
+        released = sheets.make_graded(solutions, points).cells
+        texts = [c.source for c in released if c.cell_type == "markdown"]
+        links = re.findall(r"\]\(([^)]*)\)", "\n".join(texts))
+        assert [link for link in links if not link.startswith("http")] == []
+        assert not any("solved" in text or "Start" in text for text in texts[:2])
+        assert re.fullmatch(r"\d h \d\d min · chapters: \d\d(,\s\d\d)*", texts[1])
+
+
+def test_a_class_without_nbgrader_is_refused_before_anything_is_written(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    folder = tmp_path / "course"
+    with pytest.raises(SystemExit, match="run `pip install nbgrader`"):
+        sheets.make_course(folder)
+    assert not folder.exists()
+
+
+def test_nbgrader_finds_the_programs_beside_its_python(tmp_path, monkeypatch):
+    """It starts alembic by name, which failed where the environment was not activated."""
+    calls = []
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: sheets)
+    monkeypatch.setattr(subprocess, "run", lambda *_, **options: calls.append(options))
+    sheets.make_course(tmp_path)
+    assert len(calls) == len(SHEETS)
+    for options in calls:
+        first = options["env"]["PATH"].split(os.pathsep)[0]
+        assert first == str(Path(sys.executable).parent)
