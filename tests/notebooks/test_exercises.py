@@ -367,6 +367,9 @@ def test_what_a_sheet_does_beside_its_answers_costs_no_points(tmp_path):
             "import pandas as pd\ntracks = pd.read_csv('tracks.csv')",
             "import time\ntime.sleep(25)",
             "path = pd.read_csv('path.csv')  # the name of an argument",
+            "n = " + " + ".join(["1"] * 6000),
+            "nonlocal n",
+            "import os\nos._exit(0)",
         ):
             sheet.append(nbformat.v4.new_code_cell(source))
 
@@ -388,7 +391,7 @@ def test_each_task_of_a_sheet_has_a_row_with_the_reason(tmp_path):
     rows = marking.mark_sheet(solved_sheet(tmp_path / "sheet.ipynb", edit), 1)
     said = {row["task"]: row["message"] for row in rows}
     assert re.search(
-        r"the sheet defines no velocity; not Python: .*cell \d+, line 1",
+        r"the sheet defines no velocity; cell \d+ is left out: .*line 1",
         said["velocity"],
     )
     assert "line_of_sight is a float; expected a function" in said["line_of_sight"]

@@ -10,6 +10,7 @@ it costs points. `serve` in place of the files answers the checks of a notebook.
 from __future__ import annotations
 
 import argparse
+import ast
 import csv
 import json
 import os
@@ -32,11 +33,11 @@ def read_source(file: Path) -> tuple[str, list[str]]:
     sources, faults = [], []
     for number, cell in enumerate(jupytext.read(file).cells, 1):
         if cell.cell_type == "code":
-            source = translate_magics(cell.source)
             try:
-                symtable.symtable(source, f"cell {number}", "exec")
-            except (SyntaxError, ValueError) as error:
-                faults.append(f"not Python: {error}")
+                source = translate_magics(cell.source)
+                symtable.symtable(ast.unparse(ast.parse(source, "cell")), "cell", "exec")
+            except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+                faults.append(f"cell {number} is left out: {error}")
             else:
                 sources.append(source)
     return "\n\n".join(sources), faults
