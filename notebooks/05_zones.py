@@ -112,8 +112,8 @@ real_day.compare_with_plaza(
 )
 
 # %% [markdown]
-# The band is an interval of **where 5 % come nearer**, not of the zone that people keep (dotted). The two differ by some
-# centimetres, and "Does it find the true zone?" says why. The zone of the robot comes in chapter 06, with an interval that
+# The band is an interval of **where 5 % come nearer**, not of the zone that people keep (dotted on the plaza, where the two
+# differ by some centimetres; "Does it find the true zone?" says why). The zone of the robot comes in chapter 06, with an interval that
 # is meant to hold the truth.
 #
 # ## A number first

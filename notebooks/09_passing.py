@@ -270,7 +270,7 @@ ahead, behind = zone.curve()[:, 0].max(), -zone.curve()[:, 0].min()
 print(f"the zone reaches {ahead:.2f} m ahead and {behind:.2f} m behind: {100 * (ahead - behind):+.0f} cm")
 
 # %% [markdown]
-# A person hardly notices a difference of a few centimetres.
+# On the plaza the difference is a few centimetres: a person hardly notices it.
 
 # %% [markdown]
 # ## Where gamma = 0.05 comes from

@@ -303,7 +303,7 @@ Markdown(
 # | any Dask scheduler | `szlib extract atc/ --out days --scheduler tcp://HOST:8786 --wait 600`: workers may come ten minutes later |
 #
 # Measured on a machine of **two cores**, with raw days of 1 GB and 15 million rows (`python -m studies.many_days`; the
-# memory is that of the largest process):
+# memory is that of the largest process). There four processes are no faster than one, which uses both cores already:
 
 # %% jupyter={"source_hidden": true}
 # Table

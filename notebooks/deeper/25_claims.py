@@ -112,7 +112,7 @@ record.figure(fig, "verdicts")
 # An effect above 0 is as the paper says; a hollow square means that the 95 % interval contains 0, or that
 # the zone has too few people on some side.
 # "too few" gives the number of encounters. Units: *share* is the share of cases less one half, one *doubling* is a
-# factor of two.
+# factor of two. "Within a factor of two" has the effect 1 less the number of doublings between both: 1 is equal.
 #
 # ## The claims, on this data
 #
@@ -240,13 +240,14 @@ record.check(
 # | `method` | the zone is where | with more people |
 # |---|---|---|
 # | `"quantile"` | in each direction 5 % of the encounters come nearer | stable |
-# | `"hull"` | nobody ever was | shrinks: one careless person is enough |
+# | `"hull"` | nobody was, but for encounters that stand out | shrinks: it is the nearest of all others |
 # | `"respect"` | careful people keep out, compared with people who ignore each other | stable; needs a null model |
 #
 # Without `method`, szlib takes the respect zone if the data has 150 encounters, if the null model has as many, and if
 # they show respect. Else it takes the paper's, as a description. The quantile is beside the notebooks, in
 # `studies/quantile_zone.py`: importing this file adds it to `szlib.SocialZone.fit`.
-# `"paper"` is the hull after LOF with 20 neighbours removed 0.2 % of the samples (chapter 03).
+# `"paper"` is the hull after LOF with 20 neighbours removed 0.2 % of the samples (chapter 03); there one careless
+# person may be enough.
 #
 # Each zone has 95 % intervals from resampled pairs of people. With fewer than 20 encounters on some side, using it
 # gives a warning, and it is drawn dashed. `zone.adequate(speed)` says the same in code.

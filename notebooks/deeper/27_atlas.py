@@ -105,7 +105,7 @@ record.figure(fig, "corridor-map")
 # | deadlock | it was not at its goal after 60 s |
 # | backs out | it went back by 0.5 m or more |
 # | waits | it yielded for 1 s or more in all |
-# | passes on the other side | it met the person on its left |
+# | passes on the other side | it had the person on its right when it passed |
 # | goes ahead | none of these |
 #
 # The atlas is a saved table of 1,384 runs (`python -m studies.atlas`). Twelve of them are driven again here.

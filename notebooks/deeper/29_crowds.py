@@ -121,8 +121,8 @@ record.figure(fig, "crossing")
 # - **speed model** (JuPedSim): as fast as the gap ahead allows, around people who are near.
 #
 # The first comes with the extra `crowds`. The third shows how to add a model: it is a class in
-# `tests/helpers/speed_model.py`, and `ReactingPeople(SpeedModel)` uses it. Its results below are saved. To
-# compute them again, install JuPedSim and run the study:
+# `tests/helpers/speed_model.py`, and `ReactingPeople(SpeedModel)` uses it. It has no results
+# below: install JuPedSim and run the study:
 # `pip install --no-deps jupedsim deprecated wrapt`, then `python -m studies.crowd_trials`.
 
 # %% jupyter={"source_hidden": true}
