@@ -393,7 +393,7 @@ near = samples[samples["distance"] <= r_max]
 few = near.loc[np.abs(near["los_angle"]) > 3 * np.pi / 4, "encounter"].nunique()
 ahead = claims.measure_reach_ahead(zone, speed=zone_speed)
 claim = f"the zone at {zone_speed:g} m/s reaches farther ahead than behind"
-record.claim(claim, ahead.verdict == "supported", f"{ahead}; {few} encounters were in view behind")
+record.claim(claim, ahead.verdict, f"{ahead}; {few} encounters were in view behind")
 Markdown(
     f"""<details><summary>Answer</summary>
 

@@ -98,7 +98,7 @@ def main(names: list[str]) -> None:
             refresh(source)
     for name, figure in PICTURES.items():
         if not names or any(folders.has_name(Path(figure.partition("-")[0]), number) for number in names):
-            few = 32 if name.endswith(".gif") else 128
+            few = 20 if name.endswith(".gif") else 128
             copy_picture(LAB / "synthetic" / "figures" / figure, name, colours=few)
 
 

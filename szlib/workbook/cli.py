@@ -4,7 +4,7 @@ exit codes:
   0    success
   1    a check failed, or a day could not be extracted
   2    the command cannot be carried out; one line says why (set SZLIB_TRACEBACK=1 for the traceback)
-  129, 130, 143   stopped by a closed terminal, by Ctrl-C or by SIGTERM; finished results stay
+  129, 130, 143   stopped by a closed terminal, by Ctrl-C or by SIGTERM; finished results of this command stay
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..encounters.geometry import Area
     from ..tracks.recipe import Recipe
 
-_STOPPED = "stopped; finished results stay in their folder"
+_STOPPED = "stopped; finished results of this command stay in their folder"
 # Errors of standard output or standard error that is full, closed or missing (None).
 _BROKEN_STREAM = (OSError, ValueError, AttributeError)
 # Numbers of errors of writing; those of files, not of streams, have a file name.

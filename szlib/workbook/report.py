@@ -153,7 +153,10 @@ def _render_front_page(
         named=named,
         notebooks=list(notebooks),
         stages=summary.get("stages", []),
-        zone=_show_zone(home / "zone.json", speed, is_synthetic=is_synthetic),
+        # the verdict is that of a zone of these files
+        zone=_show_zone(home / "zone.json", speed, is_synthetic=is_synthetic)
+        if verdict.startswith("zone")
+        else {},
         scenarios={each.title: name for name, each in SCENARIOS.items()},
     )
     return html.rpartition("<!-- notebooks -->")[::2]
@@ -165,9 +168,8 @@ _DESCRIBED = ("data", "area", "date", "command", "machine", "szlib", "versions")
 
 def _complete_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
     """The outcome of the notebook `name`; each check has its notebook and its key, "NN: name"."""
-    number = name.split("_")[0]
     checks = [
-        {"notebook": name, "key": f"{number}: {check['name']}", **check}
+        {"notebook": name, "key": f"{name.split('_')[0]}: {check['name']}", **check}
         for check in outcome["checks"]
     ]
     return {"error": outcome["status"], **outcome, "checks": checks}

@@ -260,6 +260,7 @@ def test_notebook_without_disk_space_is_refused_with_exit_code_2(
         ({"seed": -1}, "seed: expected 0 to"),
         ({"seed": float("inf")}, "seed: expected int"),
         ({"seed": None}, "seed: expected int"),
+        ({"has_walls": "True"}, "expected bool, such as false; got 'True'"),
         ({"gamma": 2.0}, r"gamma must be in \(0, 1\]"),
         ({"gamma": 0}, r"gamma must be in \(0, 1\]"),
         ({"gamma": float("nan")}, "gamma: expected"),
@@ -371,7 +372,7 @@ def test_sigterm_stops_extract_with_exit_code_143(tmp_path):
     done.send_signal(signal.SIGTERM)
     _, printed = done.communicate()
     assert done.returncode == 143
-    assert "szlib: stopped; finished results stay" in printed
+    assert "szlib: stopped; finished results of this command stay" in printed
     assert not list(tmp_path.rglob(".szlib-part-*"))
 
 
@@ -405,7 +406,7 @@ time.sleep(120)"""
     assert not [each for each in alive if each.status() != psutil.STATUS_ZOMBIE]
     if number == signal.SIGTERM:
         assert run.returncode == 143
-        assert "szlib: stopped; finished results stay" in printed
+        assert "szlib: stopped; finished results of this command stay" in printed
         assert not list(tmp_path.glob("*.json")), "the kernel's connection file"
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert not left["passed"]

@@ -254,6 +254,24 @@ def test_a_notebook_that_is_not_in_the_summary_is_left_out(tmp_path):
     assert "07_now" in text and "19_before" not in text
 
 
+@pytest.mark.filterwarnings("ignore::szlib.DataWarning")
+def test_a_zone_of_other_files_is_not_shown(tmp_path):
+    """The verdict is left out where `zone.json` was made of other files than those of the run."""
+    settings = szlib.PlazaSettings(n_encounters=100)
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "p.csv", settings=settings))
+    samples = szlib.find_encounters(tracks)
+    zone = szlib.SocialZone.fit(samples, method="paper", n_resamples=0)
+    zone.save(tmp_path / "zone.json")
+    row = f"<td>{zone.table()['a'].iloc[0]:.2f}</td>"
+    write(tmp_path, "07_now", "# 7 - Now")
+    for facts, is_shown in (
+        ({"verdict": "zone at 1.1 m/s: usable"}, True),
+        ({}, False),
+    ):
+        report = write_report(tmp_path, summarise("07_now", **facts))
+        assert (row in report.read_text(encoding="utf-8")) == is_shown
+
+
 def test_links_to_files_outside_of_the_report_leave_their_text(tmp_path):
     text = "exercises: [5.1](exercises/sheet5.ipynb#5.1-Focal-distance-(15-min)), "
     text += "[5.2](exercises/sheet5.ipynb)"

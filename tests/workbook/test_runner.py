@@ -313,7 +313,6 @@ def test_notebooks_that_run_at_the_same_time_share_the_cores(
         (["-p", "seed=abc"], "parameter seed: expected int, such as 0; got 'abc'"),
         (["-p", "seed=1.5"], "parameter seed: expected int"),
         (["-p", "seed=true"], "parameter seed: expected int"),
-        (["-p", "has_walls=True"], "expected bool, such as false; got 'True'"),
         (["--only", "99"], "no notebook 99; there are 01_one"),
         (["--data", "nowhere.csv"], "nowhere.csv: no such file"),
     ],
