@@ -22,6 +22,7 @@ import pandas as pd
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # for `studies`
 from studies.atlas import REFERENCE
+from studies.committed import claim_new_folder
 from submission import RULES, RefusedError, Submission, find_prefix
 
 import szlib
@@ -136,7 +137,7 @@ def main(arguments: list[str] | None = None) -> None:
     lines = [f"| {' | '.join(line)} |" for line in lines]
     where = f'--meeting "{given.meeting}"' if given.meeting else "all meetings"
     text = "\n".join([*lines, "", f"Worlds: --seed {seed} --worlds {given.worlds}, {where}."])
-    given.out.mkdir(parents=True, exist_ok=True)
+    claim_new_folder(given.out, "boards of the project")
     (given.out / "board.md").write_text(text + "\n", encoding="utf-8")
     table.to_csv(given.out / "board.csv", index=False, float_format="%.6g")
     print(text)

@@ -17,7 +17,7 @@ from typing import Any
 
 import pandas as pd
 
-from szlib.core.files import write_file
+from szlib.core.files import claim_folder, write_file
 from szlib.workbook.record import TABLES
 
 
@@ -67,6 +67,12 @@ def write_table(table: pd.DataFrame, name: str, *, seed: int = 0) -> None:
     header = json.dumps({"command": command, "seed": seed, "commit": _describe_commit()})
     text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
     write_file(TABLES / f"{name}.csv", f"# {header}\n{text}")
+
+
+def claim_new_folder(folder: Path, purpose: str) -> None:
+    """Make `folder`, and mark it as szlib's, if it does not exist: then `szlib run` may write beside it."""
+    if not folder.exists():
+        claim_folder(folder, purpose)
 
 
 def read_arguments(description: str | None, **options: Any) -> argparse.Namespace:

@@ -30,7 +30,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from studies.claims import SITES
-from studies.committed import read_arguments, study, write_table
+from studies.committed import claim_new_folder, read_arguments, study, write_table
 from studies.lesson_zones import WIDEST
 from studies.plaza_truth import true_kinds
 
@@ -267,7 +267,7 @@ def judge_row(source: str, draw: int, zone: szlib.Ellipse) -> list[dict[str, Any
 
 def list_robots(zones: pd.DataFrame, jobs: int) -> Iterator[dict[str, Any]]:
     """The claims about robots, in each of the `zones` by the paper's chain."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
+    claim_new_folder(FOLDER, "judged zones of studies")
     papers = zones.query('chain == "the paper\'s"').dropna(subset=["a"]).sort_values(["draw", "source"])
     found = [(row["source"], row["draw"], read_zone(row)) for _, row in papers.iterrows()]
     tasks = [joblib.delayed(judge_row)(*each) for each in found]

@@ -24,7 +24,7 @@ import joblib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from studies.committed import NULL_MODELS, read_arguments, study, write_table
+from studies.committed import NULL_MODELS, claim_new_folder, read_arguments, study, write_table
 from studies.noninteracting_crowd import noninteracting_crowd
 from studies.sites import GRAND_CENTRAL_RATE, read_grand_central
 
@@ -186,7 +186,7 @@ def stored(asked: argparse.Namespace, name: str, find: Callable[[], Encounters])
     """Samples of a site and its null model, stored between studies."""
     file = asked.cache / f"{name}.joblib"
     if not file.exists():
-        file.parent.mkdir(parents=True, exist_ok=True)
+        claim_new_folder(file.parent, "null models of studies")
         joblib.dump(find(), file)
     return joblib.load(file)
 

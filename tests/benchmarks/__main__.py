@@ -32,8 +32,10 @@ from studies.ipopt import ByIpopt
 import szlib
 from benchmarks import data_growth, data_sizes, measuring, steps
 from szlib.core.checks import Array
+from szlib.core.files import claim_folder
 from szlib.plaza.generation import make_plaza
 from szlib.tracks import datasets
+from szlib.workbook.folders import PURPOSE
 
 
 def in_turn(
@@ -305,13 +307,13 @@ def main() -> None:
         sys.exit(
             f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(cases)}"
         )
+    results = claim_folder("results", PURPOSE)
     found: dict[str, dict[str, float]] = {}
     for name in wanted:
         bench = cases[name]
         found[name] = {key: float(f"{value:.4g}") for key, value in bench().items()}
         print(measuring.report(name, found[name], bars.get(name)), flush=True)
-    Path("results").mkdir(exist_ok=True)
-    Path("results/bench.json").write_text(json.dumps(found, indent=1))
+    (results / "bench.json").write_text(json.dumps(found, indent=1))
     if "--save" in sys.argv:
         measuring.save(found)
 

@@ -14,6 +14,9 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 
+from szlib.core.files import claim_folder
+from szlib.workbook.folders import PURPOSE
+
 HERE = Path(__file__).parent
 ATTACKS = sorted(
     f.stem for f in HERE.glob("*.py") if not f.stem.startswith(("_", "test_"))
@@ -38,6 +41,7 @@ def main() -> int:
             file=sys.stderr,
         )
         return 2
+    claim_folder(TALLY.parent, PURPOSE)
     if len(names) == 1:
         tally = {names[0]: _attack(names[0], bool(long))}
         if long:
@@ -103,7 +107,6 @@ def commit() -> str:
 
 
 def _finish(tally: dict[str, dict[str, float]]) -> int:
-    TALLY.parent.mkdir(exist_ok=True)
     TALLY.write_text(json.dumps(tally, indent=1), encoding="utf-8")
     found = [
         count

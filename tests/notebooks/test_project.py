@@ -178,7 +178,8 @@ def test_the_board_has_the_result_of_each_controller(tmp_path, monkeypatch, caps
     monkeypatch.setattr(
         judging, "read_submissions", lambda _: dict.fromkeys(points, "")
     )
-    judging.main(["--out", str(tmp_path)])
+    monkeypatch.chdir(tmp_path)
+    judging.main([])
     head, _, *rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
         for line in capsys.readouterr().out.splitlines()
@@ -191,10 +192,11 @@ def test_the_board_has_the_result_of_each_controller(tmp_path, monkeypatch, caps
     expected = {"best": beyond, "rivals/tuned": 20, "mine": 10, "rivals/paper": 0}
     assert best - low == pytest.approx(20)
     assert found == pytest.approx(expected, abs=0.05)
-    table = pd.read_csv(tmp_path / "board.csv")
+    table = pd.read_csv(tmp_path / "results" / "project" / "board.csv")
     assert table.groupby("controller")["result"].unique().map(list).to_dict() == {
         name: [value] for name, value in found.items()
     }
+    folders.claim_results(tmp_path / "results", "synthetic")  # as `szlib run` does
 
 
 EDIT = """

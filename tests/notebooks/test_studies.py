@@ -3,11 +3,12 @@
 import importlib
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from studies import committed
+from studies import committed, paper_matrix, respect
 
 from szlib.workbook import folders
 from szlib.workbook.record import TABLES
@@ -79,3 +80,12 @@ def test_the_arguments_of_a_study_have_their_defaults_and_types(monkeypatch):
     assert asked == {"study": "zones", "n": 5, "sites": ["c", "d"], "first_seed": 7}
     monkeypatch.setattr("sys.argv", ["python", "claims", "5"])
     assert committed.read_arguments("", **options).sites == ["a", "b"]
+
+
+def test_szlib_run_may_write_beside_what_studies_store(tmp_path, monkeypatch):
+    asked = SimpleNamespace(cache=tmp_path / "results" / "null")
+    assert respect.stored(asked, "site", lambda: 7) == 7
+    monkeypatch.setattr(paper_matrix, "FOLDER", tmp_path / "results" / "paper_matrix")
+    zones = pd.DataFrame(columns=["chain", "draw", "source", "a"])
+    assert list(paper_matrix.list_robots(zones, 1)) == []
+    folders.claim_results(tmp_path / "results", "synthetic")

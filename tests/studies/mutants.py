@@ -45,6 +45,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 from scipy.stats import binomtest
 
+from szlib.core.files import claim_folder
+
 ROOT = Path(__file__).parents[2]
 DRAWN = ["control", "encounters", "zones"]
 DRAWN += [f"simulation/{name}.py" for name in ("metrics", "social_metrics")]
@@ -465,7 +467,8 @@ def main() -> None:
     )
     parser.add_argument("--pause", type=Path, help="pause while this file exists")
     asked = parser.parse_args()
-    asked.out.mkdir(parents=True, exist_ok=True)
+    if not asked.out.exists():
+        claim_folder(asked.out, "outcomes of mutants")
     os.environ |= {
         "SZLIB_CACHE": "off",
         "OMP_NUM_THREADS": "1",

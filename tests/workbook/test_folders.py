@@ -200,3 +200,23 @@ def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
     (results / "mine" / "figures").rmdir()
     script["clean"](results)
     assert not results.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("benchmarks", "import szlib"),
+        ("hostile", "reading"),
+        ("studies/mutants.py", "table", "--out", "results/mutants"),  # has no outcomes
+    ],
+)
+def test_szlib_run_may_write_beside_a_tool(tmp_path, command):
+    tool, *arguments = command
+    file = Path(__file__).parents[1] / tool
+    subprocess.run(
+        [sys.executable, str(file), *arguments],
+        cwd=tmp_path, env=ENVIRONMENT, capture_output=True, check=False,
+    )  # fmt: skip
+    assert any((tmp_path / "results").glob("[!.]*"))
+    folders.claim_results(tmp_path / "results", "synthetic")
