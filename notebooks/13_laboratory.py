@@ -70,7 +70,8 @@ Laboratory(zone=zone) if is_interactive() else None
 # If you run this notebook (*Run > Run All Cells*), the laboratory appears above this text. The picture shows one moment of it. Choose a
 # scene, press *play* or *step*, and move the time line to go back. Drag what you like, also while it runs: people, the tip of
 # a person's arrow, the robot, its goal, the ends of walls. The green area holds all accelerations that the robot may choose
-# now. The sentence over the picture names the *active* limit, the one that holds the robot (chapter 10): it is the orange edge. *share*
+# now without paying a price. With `among_people()` it may pay one and choose another; then the sentence over the picture says
+# so. Otherwise the sentence names the *active* limit, the one that holds the robot (chapter 10): it is the orange edge. *share*
 # writes code that computes what is on the screen.
 
 # %% [markdown]

@@ -16,6 +16,7 @@ from shapely.plotting import patch_from_polygon
 
 import szlib
 from szlib.control import Obstacles
+from szlib.control.obstacles import Priority
 from szlib.control.problem import list_conditions
 from szlib.core.checks import Array
 from szlib.workbook import figures
@@ -35,11 +36,19 @@ class BarrierLimit(NamedTuple):
     row : place of the obstacle in `Step.obstacles`.
     k : the row links steps k and k + 1 of the plan.
     curve : points with the allowed side on the left, shape (n, 2) [m/s2].
+    priority : of the row. With a `decay_price` the plan may violate the decay, and pays its price.
     """
 
     row: int
     k: int
     curve: Array
+    priority: Priority
+
+    @property
+    def forbidden(self) -> Any:
+        """The side of the curve that is forbidden, as far as the curve is long: a Shapely polygon."""
+        along_x, along_y = self.curve[-1] - self.curve[0]
+        return shapely.Polygon(np.vstack([self.curve, self.curve[::-1] + np.array([along_y, -along_x])]))
 
 
 class AdmissibleControls(NamedTuple):
@@ -58,7 +67,7 @@ class AdmissibleControls(NamedTuple):
 def find_admissible_controls(step: szlib.Step) -> AdmissibleControls:
     """Find the accelerations that a step could have chosen: bounds, speed limit, and every barrier row.
 
-    Prices are ignored: every decay counts as hard. A terminal condition is ignored, because with the rest of
+    Prices are ignored: every decay counts as hard, so a control that pays one lies outside. A terminal condition is ignored, because with the rest of
     the plan unchanged it allows only the chosen acceleration. If the plan is not feasible, the polygon is
     empty or does not contain the control.
 
@@ -91,7 +100,7 @@ def find_admissible_controls(step: szlib.Step) -> AdmissibleControls:
                 outer = curve[::-1] + 2 * _REACH * s.a_max * inward
                 allowed = shapely.Polygon(np.vstack([curve, outer]))
                 if not allowed.covers(free):
-                    limits.append(BarrierLimit(i, k, curve))
+                    limits.append(BarrierLimit(i, k, curve, condition.level))
                     polygon = polygon.intersection(allowed)
     return AdmissibleControls(polygon, tuple(limits))
 
@@ -183,10 +192,7 @@ def _strictest_limits(limits: tuple[BarrierLimit, ...], reach: float) -> list[tu
     box = shapely.box(-reach, -reach, reach, reach)
     strictest: dict[int, tuple[BarrierLimit, Any]] = {}
     for limit in limits:
-        (x0, y0), (x1, y1) = limit.curve[0], limit.curve[-1]
-        right = np.array([y1 - y0, x0 - x1]) / np.hypot(x1 - x0, y1 - y0)
-        side = shapely.Polygon(np.vstack([limit.curve, limit.curve[::-1] + 4 * reach * right]))
-        forbidden, source = side.intersection(box), limit.row
+        forbidden, source = limit.forbidden.intersection(box), limit.row
         if source not in strictest or forbidden.area > strictest[source][1].area:
             strictest[source] = limit, forbidden
     return list(strictest.values())

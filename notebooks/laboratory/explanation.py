@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 import szlib
-from szlib.control.step import HOLDS
+from szlib.control.obstacles import Priority
 from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
 
 from .admissible_controls import AdmissibleControls, BarrierLimit, find_admissible_controls
@@ -44,8 +44,8 @@ class Explanation(NamedTuple):
 def explain(step: szlib.Step) -> Explanation:
     """Explain a step of an `MPCCBF`.
 
-    A limit is active if the chosen acceleration lies on its edge. Persons and walls are numbered as in
-    `Step.explain`, from 0.
+    A limit is active if the chosen acceleration lies on its edge, and no other limit is exceeded at a price.
+    Persons and walls are numbered as in `Step.explain`, from 0.
 
     Examples
     --------
@@ -62,9 +62,12 @@ def explain(step: szlib.Step) -> Explanation:
     is_shown = ("control", "nearest", *_OF_WAYS)
     notes = tuple(_as_sentence(line) for line in rest if not line.startswith(is_shown))
     found = find_admissible_controls(step)
-    active = _find_active(step, found) if step.feasible else ()
+    price = _describe_price(step, found)
+    active = _find_active(step, found) if step.feasible and not price else ()
     if not step.feasible:
         reason = f"no plan keeps every limit, so the plan is {meaning}"
+    elif price:
+        reason = price
     elif active:
         reason = _describe_limits(step, active)
     else:
@@ -86,6 +89,23 @@ def _find_active(step: szlib.Step, found: AdmissibleControls) -> tuple[BarrierLi
         if distance <= _AT_LIMIT * step.scene.settings.a_max:
             nearest.setdefault(limit.row, limit)
     return tuple(sorted(list(nearest.values())[:_MOST_NAMED], key=lambda limit: limit.row))
+
+
+def _describe_price(step: szlib.Step, found: AdmissibleControls) -> str:
+    """The limits beyond which the control lies, because the plan pays their price; "" if there are none."""
+    s, control, beyond = step.scene.settings, shapely.Point(step.control), dict[Priority, dict[str, None]]()
+    for limit in found.limits if s.decay_price < inf else ():
+        off = shapely.LineString(limit.curve).distance(control)
+        if off > _AT_LIMIT * s.a_max and limit.forbidden.covers(control):
+            beyond.setdefault(limit.priority, {})[name_limit(step, limit)] = None
+    texts = {
+        Priority.DECAY: "it comes nearer to {} than gamma allows, at a price",
+        Priority.ZONE: "its plan leads through the zone of {}, at a price",
+    }
+    for priority, text in texts.items():
+        if priority in beyond:
+            return text.format(" and ".join([*beyond[priority]][:_MOST_NAMED]))
+    return ""
 
 
 def name_limit(step: szlib.Step, limit: BarrierLimit) -> str:
@@ -129,12 +149,8 @@ def _describe_freedom(step: szlib.Step) -> str:
     """Why the robot chose a control that lies on the limit of no person and no wall."""
     scene, s = step.scene, step.scene.settings
     x, y, *velocity = scene.state
-    paid = np.flatnonzero(step.residual[: len(scene.people)].min(axis=1, initial=inf) < -HOLDS).tolist()
     if dist((x, y), scene.goal) <= GOAL_RADIUS and hypot(*velocity) <= STOPPED_SPEED:
         return "it is at its goal"
-    if paid:
-        names = " and ".join(f"person {i}" for i in paid[:_MOST_NAMED])
-        return f"it comes nearer to {names} than gamma allows, at a price"
     if hypot(*step.predicted[1, 2:]) >= s.v_max - _AT_LIMIT:
         return f"{s.v_max:g} m/s is its highest speed, and no person and no wall limits it"
     if max(abs(step.control)) >= s.a_max * (1 - _AT_LIMIT):

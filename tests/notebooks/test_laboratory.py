@@ -205,6 +205,21 @@ def test_a_limit_is_named_if_and_only_if_the_acceleration_lies_on_its_edge(name)
         assert reasons.safety.startswith("Safe") == step.safe
 
 
+@pytest.mark.parametrize("name", ["making_room", "corridor", "blind corner"])
+def test_the_sentence_names_the_price_if_the_acceleration_lies_outside_the_green_area(
+    name,
+):
+    world, n_outside = make_world(name, robots=[AMONG_PEOPLE]), 0
+    for _ in range(10):
+        step, reasons = advance(world, 5).steps[0], explain(world.steps[0])
+        off = reasons.found.polygon.distance(shapely.Point(step.control))
+        is_outside = step.feasible and not off <= 0.02  # nan: no area
+        assert reasons.sentence.endswith(", at a price.") == is_outside
+        assert not (is_outside and reasons.active)
+        n_outside += is_outside
+    assert 3 < n_outside < 10
+
+
 def sentence(world):
     return explain(world.steps[0]).sentence
 
@@ -221,7 +236,7 @@ def test_the_sentence_says_what_the_robot_does_and_why():
     assert sentence(make_world(n=40)).endswith(
         "and h may shrink by at most 5 % a step."
     )
-    assert "at most 10 % a step" in sentence(make_world(n=40, robots=[AMONG_PEOPLE]))
+    assert "at most 10 % a step" in sentence(make_world(n=16, robots=[AMONG_PEOPLE]))
     assert sentence(make_world("making_room", 20)).startswith("It goes back")
     there = make_world("passing", 95)
     assert sentence(there).startswith(
