@@ -65,6 +65,8 @@ every = claims.judge_sentences(claims.read_checks(record))
 is_stress = every["kind"] == "stress"
 sentences, stress = every[~is_stress].copy(), every[is_stress]
 counts = sentences["verdict"].value_counts()
+judged = sentences[sentences["verdict"] != claims.NOT_RUN]
+n_not_run = len(sentences) - len(judged)
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -76,7 +78,9 @@ ax.bar_label(bars, padding=3)
 ax.invert_yaxis()
 ax.set(xlabel="sentences of the paper", xlim=(0, 1.1 * counts.max()))
 good = sum(counts.get(name, 0) for name in ("supported", "implemented", "implemented, by test"))
-ax.set_title(f"{good} of {len(sentences)} sentences are supported or implemented as they stand")
+title = f"{good} of {len(judged)} sentences are supported or implemented as they stand"
+left_out = f";\n{n_not_run} other sentences were not run with this data"
+ax.set_title(title + left_out * bool(n_not_run))
 record.figure(fig, "verdicts")
 
 # %% [markdown]
@@ -148,6 +152,7 @@ style_table(shares[["claim", "verdict", "share", "zones", "decides", "controls"]
 # | not decidable | the data is too little to say |
 # | untestable here | tracks and simulations alone cannot decide it, for example comfort |
 # | not done here | it can be tested, but nobody did it here |
+# | not run with this data | the notebook that checks it was not run, or was run with other data |
 #
 # The verdicts are computed from the checks and claims that the notebooks of this run recorded, and from the table of
 # conditions, of which each run drives one cell again. If a notebook was not run, or was run with other data, its
@@ -201,11 +206,13 @@ style_table(stress[["place", "sentence", "verdict", "numbers"]])
 
 # %% jupyter={"source_hidden": true}
 # What we know now
-claimed = sentences.loc[sentences["kind"] == "claim", "verdict"]
+claimed = judged.loc[judged["kind"] == "claim", "verdict"]
+n_claims = (sentences["kind"] == "claim").sum() - len(claimed)
+left_out = f"; {n_not_run} others, {n_claims} of them claims, were not run with this data"
 held, failed = ((papers["verdict"] == word).sum() for word in ("supported", "not supported"))
 Markdown(
-    f"**What it means.** Of {len(sentences)} sentences {len(claimed)} claim something about people or the robot, and "
-    f"{(claimed == 'supported').sum()} of these are supported as they stand. Of the {len(papers)} claims that were judged in "
+    f"**What it means.** Of {len(judged)} sentences {len(claimed)} claim something about people or the robot, and "
+    f"{(claimed == 'supported').sum()} of these are supported as they stand{left_out * bool(n_not_run)}. Of the {len(papers)} claims that were judged in "
     f"many conditions, {held} hold in nearly all, {failed} in nearly none, and for {by.get('condition', 0)} the controller or the chain "
     "decides more than the place where people were recorded."
 )

@@ -8,7 +8,7 @@ import nbformat
 import pytest
 from studies import real_day
 
-from szlib.workbook import folders
+from szlib.workbook import claims, folders
 
 COPIES = sorted((folders.NOTEBOOKS / "real_day").glob("*.ipynb"))
 SCRIPTS = {script.stem: script for script in folders.list_notebooks()}
@@ -54,6 +54,40 @@ class TestCopy:
         text = copy.read_text(encoding="utf-8")
         assert len(text) < 1_500_000
         assert not re.search(r"/(home|root|work|tmp|Users)/|at 0x", text)
+
+
+@pytest.mark.parametrize("folder", ["deeper", "real_day"])
+def test_sentences_that_were_not_run_are_in_no_share_and_are_said(folder):
+    cells = nbformat.read(
+        folders.NOTEBOOKS / folder / "28_sentences.ipynb", as_version=4
+    ).cells
+    outputs = [out for cell in cells for out in cell.get("outputs", ())]
+    tables = "".join(out.get("data", {}).get("text/html", "") for out in outputs)
+    counts = {
+        verdict: int(number)
+        for verdict, number in re.findall(
+            r"<summary>(.+): (\d+) sentences</summary>", tables
+        )
+    }
+    n_not_run = counts.pop(claims.NOT_RUN, 0)
+    n_judged = sum(counts.values())
+    assert (n_not_run > 0) == (folder == "real_day")
+    (meaning,) = (
+        text
+        for out in outputs
+        if "What it means" in (text := out.get("data", {}).get("text/markdown", ""))
+    )
+    title = next(
+        out.metadata["image/png"]["alt"]
+        for out in outputs
+        if "image/png" in out.get("data", {})
+    )
+    assert f"Of {n_judged} sentences " in meaning and f" of {n_judged} " in title
+    for text in (meaning, title):
+        assert ("not run with this data" in text) == (n_not_run > 0)
+        assert not n_not_run or f"; {n_not_run} other" in text
+    meanings = "".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    assert f"\n| {claims.NOT_RUN} | " in meanings
 
 
 # --- numbers beside those of the plaza ---------------------------------------------------------------
