@@ -261,7 +261,13 @@ def weeks(story: list[Page]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]
 def make_table(story: list[Page]) -> str:
     """The table of the README: a row for each notebook that asks a question, with those that share the row."""
     lines = ["| notebook | question |", "|---|---|"]
-    for page in (page for page in story if "asks" in page.front):
+    owners = {page.number: page for page in story if "asks" in page.front}
+    for page in story:
+        row = page.front.get("row")
+        if (row or page.number) not in owners and page.source.stem != START:
+            expected = f"`asks`, or as `row` one of {', '.join(map(repr, owners))}"
+            raise ValueError(f"{page.source.name}: row is {row!r}; expected {expected}")
+    for page in owners.values():
         sharing = [each for each in story if each.front.get("row") == page.number]
         names = [f"[{p.number} {p.front['label']}](notebooks/{_path(p, story[0])})" for p in [page, *sharing]]
         lines.append(f"| {', '.join(names)} | {page.front['asks']} |")

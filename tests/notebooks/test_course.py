@@ -304,3 +304,13 @@ def test_only_the_navigation_is_replaced():
     assert course.replace_cells(
         once, {}, navigation.replace("5", "10")
     ) == once.replace("5 min", "10 min")
+
+
+@pytest.mark.parametrize("front", [{"row": "29"}, {"row": "29", "asks": "Why?"}, {}])
+def test_a_notebook_without_a_row_in_the_readme_is_refused(front):
+    """It asks a question of its own, or names the number of a notebook that does."""
+    source = folders.NOTEBOOKS / "deeper" / "30_topic.py"
+    page = course.Page(source, STORY[1].cells, {"label": "topic"} | front)
+    found = f"30_topic.py: row is {front.get('row')!r}; expected `asks`, or as `row`"
+    with pytest.raises(ValueError, match=f"{found} one of '01', '02', "):
+        course.make_table([*STORY, page])
