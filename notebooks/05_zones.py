@@ -112,9 +112,9 @@ real_day.compare_with_plaza(
 )
 
 # %% [markdown]
-# The band is an interval of **where 5 % come nearer**, not of the zone that people keep (dotted on the plaza, where the two
-# differ by some centimetres; "Does it find the true zone?" says why). The zone of the robot comes in chapter 06, with an interval that
-# is meant to hold the truth.
+# The band is an interval of **where 5 % come nearer**, not of the zone that people keep (dotted on the plaza, where
+# the two differ by some centimetres; "Does it find the true zone?" says why). The zone of the robot comes in
+# chapter 06, with an interval that is meant to hold the truth.
 #
 # ## A number first
 #
@@ -317,8 +317,8 @@ record.figure(fig, "sizes")
 # <details><summary>Answer</summary>
 #
 # On the plaza the quantile levels out with some hundred encounters, and its interval lies around it. The hull is an
-# *extreme*: the nearest people who ever came. More people can only bring nearer ones. So its interval, which should contain the hull
-# of *all* people there are, lies below the estimate itself.
+# *extreme*: the nearest people who ever came. More people can only bring nearer ones. So its interval, which
+# should contain the hull of *all* people there are, lies below the estimate itself.
 #
 # </details>
 

@@ -378,8 +378,9 @@ lowest = compared.groupby("chain", sort=False)["min_h"].min()
 record.check("h >= 0 with every chain of settings", lowest.min() >= 0, f"least h {lowest.min():.2f} m")
 
 # %% [markdown]
-# A dash means: no change of more than 0.25 s, 2 cm of h or 5 cm/s, and the same side and claims. With the zone of the plaza,
-# our zone alone changes the side, and so does the rule of the side alone. With the rule the side does not depend on the tilt of a zone
+# A dash means: no change of more than 0.25 s, 2 cm of h or 5 cm/s, and the same side and claims. On the plaza our
+# zone alone changes the side, and so does the rule of the side alone. With the rule the side does not depend on the
+# tilt of a zone
 # ([chapter 9](09_passing.ipynb)).
 
 # %% [markdown]

@@ -618,7 +618,8 @@ record.check(what, arrived == 0 and gap > 0 and blocked, f"{arrived} of 2 arrive
 # ## Try it: which door
 #
 # Nothing has to be installed for this: the runs are recorded in the page. Choose, press *play*, step, or move the time
-# line. The green area holds all accelerations that the robot may choose then without paying a price, and the sentence says why it chose this one.
+# line. The green area holds all accelerations that the robot may choose then without paying a price, and the
+# sentence says why it chose this one.
 #
 # **What do you think?** A person stands in or beside the nearer door. How far aside must they stand for the robot to take it? Does it depend on how
 # far away the other door is? Write it down, then look.

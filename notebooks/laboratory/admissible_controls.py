@@ -67,9 +67,9 @@ class AdmissibleControls(NamedTuple):
 def find_admissible_controls(step: szlib.Step) -> AdmissibleControls:
     """Find the accelerations that a step could have chosen: bounds, speed limit, and every barrier row.
 
-    Prices are ignored: every decay counts as hard, so a control that pays one lies outside. A terminal condition is ignored, because with the rest of
-    the plan unchanged it allows only the chosen acceleration. If the plan is not feasible, the polygon is
-    empty or does not contain the control.
+    Prices are ignored: every decay counts as hard, so a control that pays one lies outside. A terminal condition
+    is ignored, because with the rest of the plan unchanged it allows only the chosen acceleration. If the plan is
+    not feasible, the polygon is empty or does not contain the control.
 
     Parameters
     ----------
