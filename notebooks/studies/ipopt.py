@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import inf
 from typing import Any
@@ -11,7 +12,8 @@ import numpy as np
 
 import szlib
 from szlib.control.planner import Plan
-from szlib.control.step import Scene, Status
+from szlib.control.problem import Question
+from szlib.control.step import Scene
 from szlib.control.ways import Heading
 from szlib.core.checks import Array
 
@@ -37,13 +39,14 @@ class ByIpopt(szlib.MPCCBF):
         super().__init__(zone, **given)
         self._options = tuple(options.items())
 
-    def _decide(self, scene: Scene, heading: Heading) -> tuple[Status, Plan]:
+    def _refine(self, scene: Scene, headings: Sequence[Heading]) -> tuple[Heading, Question, Plan]:
         last = self._plan[0] if self._clock.has_begun else np.zeros(2)
-        asked = np.concatenate([scene.state, heading.target, last])
+        question = Question(scene.state, headings[0].target, last, scene.barriers)
+        asked = np.concatenate(question[:3])
         inputs = solve(self._s, scene, asked, self._plan + self._change, self._options)
         if inputs is None:
-            return super()._decide(scene, heading)
-        return "optimal", Plan(inputs, 0.0, (), False, False)
+            return super()._refine(scene, headings)
+        return headings[0], question, Plan(inputs, 0.0, (), False, False)
 
 
 def solve(

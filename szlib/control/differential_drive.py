@@ -45,6 +45,7 @@ follow with dv/dt = (acceleration of p along e) + L omega^2, so by up to V^2 / L
 from __future__ import annotations
 
 from cmath import phase, rect
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
@@ -335,12 +336,12 @@ class DifferentialDrive(MPCCBF):
         found |= {"control": control, "of_point": asked}
         return DriveStep(**found, own=self._own, wheels=self._wheels)
 
-    def _choose_heading(self, scene: Scene) -> Heading:
+    def _find_headings(self, scene: Scene) -> Sequence[Heading]:
         """As of `MPCCBF`, but straight to a goal so close that no wall lies between, as in a turn."""
         away = dist(scene.state[:2], scene.goal)
         if away < self._s.r_robot and not scene.tracked.unknown:
-            return Heading(scene.goal, away)
-        return super()._choose_heading(scene)
+            return [Heading(scene.goal, away)]
+        return super()._find_headings(scene)
 
     def _carry(self, path: Path) -> Path:
         """The way of the disc whose wheels follow the point on a `path`."""

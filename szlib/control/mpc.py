@@ -285,10 +285,11 @@ class MPCCBF(Controller):
         x, towards = self._locate(state, goal, check_number("state_age", state_age))
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._make_scene(x, towards, tracked, is_point=True)
-        heading = self._choose_heading(scene)
-        remaining = heading.length if heading.length < inf else dist(x[:2], towards)
+        headings = self._find_headings(scene)
         self._planner.begin(began)
-        status, plan, (walls_safe, passively_safe) = self._choose(scene, heading)
+        heading, question, plan = self._refine(scene, headings)
+        status, plan, (walls_safe, passively_safe) = self._choose(scene, question, plan)
+        remaining = heading.length if heading.length < inf else dist(x[:2], towards)
         step: Step = self._finish(
             control=plan.inputs[0].copy(),
             inputs=plan.inputs,
@@ -319,14 +320,14 @@ class MPCCBF(Controller):
         return x, goal
 
     def _choose(
-        self, scene: Scene, heading: Heading
+        self, scene: Scene, question: Question, plan: Plan
     ) -> tuple[Status, Plan, tuple[bool, bool]]:
         """The plan if it is safe; else the rest of the last one if only that is; else braking or the plan.
 
         And whether it touches nothing fixed, and whether it overlaps no body besides.
         """
         velocity = scene.state[2:]
-        status, plan = self._decide(scene, heading)
+        status, plan = self._decide(question, plan)
         inputs = plan.inputs
         rank = self._check(scene, inputs)
         if self._s.guard and not all(rank[:2]):
@@ -364,35 +365,62 @@ class MPCCBF(Controller):
         """What the robot does, by what was `found`."""
         return Step(**found)
 
-    def _decide(self, scene: Scene, heading: Heading) -> tuple[Status, Plan]:
-        """The plan: of least cost if one satisfies the rows, else the one that violates least by priorities.
+    def _decide(self, question: Question, plan: Plan) -> tuple[Status, Plan]:
+        """A `plan`, or braking if there is none.
 
-        The plan before may be a poor local optimum, around the wrong end of a wall; so where the way was just
-        looked for, it is compared with the one that is found along the way.
         A plan that violates a floor may be a poor local optimum, which leads through a wall; so it is
         compared with the one that is found from full braking.
         """
         s = self._s
-        state = scene.state
-        last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
-        question = Question(state, heading.target, last, _shrink_zones(scene, heading))
-        plan = self._planner.plan(question, self._plan + self._change)
-        if heading.is_searched and not plan.timed_out:
-            targets = np.gradient(heading.ways[0].at(s.times), s.times, axis=0)[1:]
-            other = self._planner.plan(
-                question, follow_velocities(s, state[2:], targets)
-            )
-            plan = min(plan, other, key=lambda each: each.rank)
-            plan = plan._replace(timed_out=other.timed_out)
+        velocity = question.state[2:]
         if plan.violations == (inf,):
-            return "braking", plan._replace(inputs=plan_braking(s, state[2:]))
+            return "braking", plan._replace(inputs=plan_braking(s, velocity))
         if max(plan.violations, default=0.0) > 0.0 and not plan.timed_out:
-            other = self._planner.plan(question, plan_braking(s, state[2:]))
+            other = self._planner.plan(question, plan_braking(s, velocity))
             if other.rank < plan.rank:
                 return "restarted", other
-        if plan.is_relaxed or hypot(*state[2:]) > s.v_max + TOLERANCE:
+        if plan.is_relaxed or hypot(*velocity) > s.v_max + TOLERANCE:
             return "relaxed", plan
         return "optimal", plan
+
+    def _refine(
+        self, scene: Scene, headings: Sequence[Heading]
+    ) -> tuple[Heading, Question, Plan]:
+        """Of the plans along the `headings`, the one that violates least, and of these costs least.
+
+        A plan cannot change the side on which it passes somebody; so each way that was just looked for has
+        one of its own, which begins along it. For the first way, the plan before is a guess as well.
+        """
+        s = self._s
+        state = scene.state
+        last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
+        guesses = [self._plan + self._change]
+        found = []
+        for heading in headings:
+            barriers = _shrink_zones(scene, heading)
+            question = Question(state, heading.target, last, barriers)
+            if heading.is_searched:
+                targets = np.gradient(heading.ways[0].at(s.times), s.times, axis=0)[1:]
+                guesses.append(follow_velocities(s, state[2:], targets))
+            plan = self._planner.plan(question, *guesses)
+            found.append((heading, question, plan))
+            if plan.timed_out:
+                break
+            guesses = []
+        if not headings[0].is_searched:
+            return found[0]
+        refined = []
+        for k, (heading, question, plan) in enumerate(found):
+            way = heading.ways[0]
+            promised = way.at(s.times[1:])
+            lost = self._planner.find_time_lost(question, plan, promised)
+            way = way._replace(cost=way.cost + lost)
+            refined.append((way.rank(plan.violations), k, way))
+        refined.sort()
+        ways = tuple(way for _, _, way in refined)
+        self._ways.keep(ways)
+        heading, question, plan = found[refined[0][1]]
+        return heading._replace(ways=ways), question, plan
 
     def _check(self, scene: Scene, inputs: Array) -> tuple[bool, bool, float]:
         """Whether the robot touches nothing fixed, and overlaps no body besides, and the least gap, to order.
@@ -485,23 +513,24 @@ class MPCCBF(Controller):
             zones = Obstacles((Group(Zone, numbers, offsets),), s.r_robot)
         return Scene(tuple(state), goal, tracked, found, zones, fixed, s, self._solids)
 
-    def _choose_heading(self, scene: Scene) -> Heading:
-        """Where the plan heads; among unknown people, where full braking ends."""
+    def _find_headings(self, scene: Scene) -> Sequence[Heading]:
+        """Where the plan may head; among unknown people, where full braking ends."""
         s = self._s
         x, y, vx, vy = scene.state
         goal = scene.goal
         at = (x, y)
-        heading = Heading(goal, dist(at, goal))
+        headings = [Heading(goal, dist(at, goal))]
         if s.lookahead < inf:
-            heading = self._ways.find(at, goal, scene.people, scene.zones)
-        target = heading.target
+            headings = self._ways.find(at, goal, scene.people, scene.zones)
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max
-            target = x + vx * time / 2, y + vy * time / 2
-        elif scene.people and not heading.ways:
+            rest = x + vx * time / 2, y + vy * time / 2
+            return [headings[0]._replace(target=rest)]
+        if scene.people and not headings[0].ways:
             ((_, numbers, _),) = scene.zones.groups
-            target = find_target(at, target, numbers.tolist(), self._fixed, s)
-        return heading._replace(target=target)
+            target = find_target(at, goal, numbers.tolist(), self._fixed, s)
+            return [headings[0]._replace(target=target)]
+        return headings
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.

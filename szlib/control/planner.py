@@ -37,7 +37,7 @@ above `NEAR` are left out; the next iteration has those that have come nearer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, inf
+from math import dist, hypot, inf
 from threading import get_ident
 from time import perf_counter, thread_time
 from typing import Any, NamedTuple
@@ -350,8 +350,18 @@ class Planner:
             return True
         return elapsed > s.time_limit and thread_time() - self._computed > s.time_limit
 
-    def plan(self, question: Question, guess: Array) -> Plan:
-        """The plan for a `question`, from a `guess`, shape (N, 2) [m/s2].
+    def plan(self, question: Question, *guesses: Array) -> Plan:
+        """The best plan for a `question` from these `guesses`, each of shape (N, 2) [m/s2]."""
+        found = list[Plan]()
+        for guess in guesses:
+            found.append(self._plan_from(question, guess))
+            if found[-1].timed_out:
+                break
+        best = min(found, key=lambda plan: plan.rank)
+        return best._replace(timed_out=found[-1].timed_out)
+
+    def _plan_from(self, question: Question, guess: Array) -> Plan:
+        """The plan for a `question`, from a `guess`.
 
         Of many obstacles, the problem contains those near the guess. If the plan comes near others, it is
         made again with them, from there.
@@ -370,6 +380,19 @@ class Planner:
                 return plan._replace(is_relaxed=True)
             spare = np.minimum(spare, after)
             guess = plan.inputs
+
+    def find_time_lost(self, question: Question, plan: Plan, points: Array) -> float:
+        """About the time that a `plan` loses against `points` at its times, with its prices [s].
+
+        The points have the shape (N, 2). If the target of the `question` is far, the scaled cost grows each
+        second by 2 v_max times the sum of the weights of positions.
+        """
+        s = self.settings
+        weights = np.outer([*s.step_lengths[:-1], 0.0], s.Q[:2])
+        weights[-1] = s.P[:2]
+        distance = max(1.0, dist(question.state[:2], question.target))
+        promised = (weights * (points - question.target) ** 2).sum() / distance
+        return float((plan.cost - promised) / (s.v_max * max(weights.sum(), TOLERANCE)))
 
     def _find_spare(self, question: Question, inputs: Array) -> Array:
         """By how much each obstacle is farther from a plan than what can matter, shape (n,) [m]."""

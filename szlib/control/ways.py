@@ -60,7 +60,8 @@ GROUP_SPEED = 0.3
 """Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed).
 People of a group that is given are together up to twice this distance."""
 SWITCH_GAIN = 1.0
-"""A way is kept until another one is this much cheaper [s] (assumed)."""
+SWITCH_DEPTH = 0.05
+"""A way is kept until another one is this much cheaper [s], or violates so much less [m] (assumed)."""
 MOST_WAYS = 3
 """Number of ways that are looked for (assumed)."""
 # the edge of a map is so far from its points, at least and at most [m]
@@ -103,14 +104,24 @@ class Way(NamedTuple):
     ----------
     points : from where the robot was when the way was found, about `SEARCH_INTERVAL` ago, shape (k, 2) [m].
     times : when the robot is there, from then on, shape (k,) [s].
-    cost : time to the end, and the prices on the way [s].
+    cost : time to the end, the prices on the way, and the time that the refined plan loses [s].
     name : in words, such as "left of person 3, behind person 5".
+    is_kept : whether it passes everything on the same side as the way that the robot was on.
     """
 
     points: Array
     times: Array
     cost: float
     name: str = ""
+    is_kept: bool = False
+
+    def rank(self, violations: Sequence[float] = ()) -> tuple[Any, ...]:
+        """Of two ways the better one has the lesser rank: by `violations` of its plan [m], and then by cost.
+
+        The way that is kept may violate `SWITCH_DEPTH` and cost `SWITCH_GAIN` more.
+        """
+        counted = [max(0.0, each - SWITCH_DEPTH * self.is_kept) for each in violations]
+        return counted if any(counted) else [], self.cost - SWITCH_GAIN * self.is_kept
 
     def at(self, times: Array) -> Array:
         """Where the robot is at these `times`, shape (n, 2) [m]; at the goal from its arrival on."""
@@ -313,8 +324,11 @@ class WayFinder:
 
     def find(
         self, at: Point, goal: Point, people: Sequence[Person], zones: Obstacles
-    ) -> Heading:
-        """The way from `at` to the `goal` among `people` with these `zones`."""
+    ) -> list[Heading]:
+        """Along each way from `at` to the `goal` among `people` with these `zones`, or the one that is kept.
+
+        The first one is the best before its plan is known; `keep` takes another one.
+        """
         if dist(goal, self._goal) > _GOAL_MOVED:
             self.reset()
             self._goal = goal
@@ -333,9 +347,13 @@ class WayFinder:
             self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
             self._ids = ids
         self._steps -= 1
-        heading = self._head_for(m, at, self._ways[0].points)
-        length = heading.length if m.is_reached else inf
-        return Heading(heading.target, length, tuple(self._ways), is_searched)
+        chosen = range(len(self._ways) if is_searched else 1)
+        found = [self._head_for(m, at, self._ways[k:]) for k in chosen]
+        return [each._replace(is_searched=is_searched) for each in found]
+
+    def keep(self, ways: Sequence[Way]) -> None:
+        """Go on along the first one of these `ways`."""
+        self._ways = list(ways)
 
     def _make_map(self, points: Array, slack: float = 0.0) -> Map:
         """A new map that holds these `points`, with this `slack`."""
@@ -368,11 +386,11 @@ class WayFinder:
             last = self._ways[0]
             passed = last.times[np.hypot(*(last.points - at).T).argmin()]
             before = _find_turns(last, near.around, passed)
-        found = []
-        for way, turns in self._find_ways(m, at, near):
-            gain = SWITCH_GAIN * (np.abs(turns - before) <= pi).all()
-            found.append((way.cost - gain, way))
-        self._ways = [way for _, way in sorted(found, key=lambda pair: pair[0])]
+        found = [
+            way._replace(is_kept=bool((np.abs(turns - before) <= pi).all()))
+            for way, turns in self._find_ways(m, at, near)
+        ]
+        self._ways = sorted(found, key=Way.rank)
 
     def _is_elsewhere(self, m: Map, goal: Point) -> bool:
         """True if the times of the map `m` are not those to the `goal`: it moved out of sight."""
@@ -438,9 +456,10 @@ class WayFinder:
             used[*cells.T] = True
             again += dt * REPEAT_SECOND * binary_dilation(used, iterations=_NEAR_WAY)
 
-    def _head_for(self, m: Map, at: Point, points: Array) -> Heading:
-        """The farthest of these `points` in sight, or a corner close by."""
+    def _head_for(self, m: Map, at: Point, ways: Sequence[Way]) -> Heading:
+        """The farthest point of the first of the `ways` that is in sight, or a corner close by."""
         p = np.array(at)
+        points = ways[0].points
         farthest = min(self._s.lookahead, _FARTHEST)
         points = points[int(np.hypot(*(points - p).T).argmin()) :]
         lengths = _time(np.vstack([p, points]), 1.0)[1:]
@@ -448,7 +467,8 @@ class WayFinder:
         chosen = m.sees(p, points[:n]) | (lengths[:n] < 3 * m.cell)
         i = np.flatnonzero(chosen).max(initial=0)
         (x, y), left = points[i].tolist(), float(lengths[-1] - lengths[i])
-        return Heading((x, y), dist(at, (x, y)) + left)
+        length = dist(at, (x, y)) + left if m.is_reached else inf
+        return Heading((x, y), length, tuple(ways))
 
 
 def _find_turns(way: Way, around: Array, since: float = 0.0) -> Array:

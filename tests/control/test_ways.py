@@ -29,6 +29,8 @@ from szlib.control.controller import advance
 from szlib.control.mpc import _shrink_zones
 from szlib.control.obstacles import Group, PaperWall
 from szlib.control.people import find_places
+from szlib.control.planner import Planner
+from szlib.control.problem import Question, build_horizon
 from szlib.control.ways import (
     CELL,
     GROUP_DISTANCE,
@@ -37,6 +39,7 @@ from szlib.control.ways import (
     MOST_CELLS,
     SEARCH_TIME,
     SMALLEST_CELL,
+    SWITCH_DEPTH,
     SWITCH_GAIN,
     ZONE_SECOND,
     Heading,
@@ -564,20 +567,70 @@ def test_a_person_met_head_on_is_passed_on_the_preferred_side(side, sign) -> Non
 
 def test_a_way_is_kept_until_another_is_clearly_cheaper() -> None:
     """A person who stands in the way steps aside, little by little: the robot changes the side once."""
-    finder = WayFinder(Obstacles((), 0.3), AMONG)
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
     sides = list[float]()
     for y in np.linspace(-1.2, 1.2, 61):
         person = szlib.Person((0.0, float(y)))
-        numbers = Zone.place(ROUND, person.position, 0.0, person.velocity)
-        zones = Obstacles.of([Zone(*numbers)], AMONG)
         for _ in range(4):
-            found = finder.find((-3.0, 0.0), (3.0, 0.0), [person], zones)
-        way = found.ways[0]
+            step = controller.step(START, (3.0, 0.0), [person])
+        way = step.ways[0]
         sides.append(np.sign(np.interp(0.0, *way.points.T) - y))
-        assert way.cost < min(each.cost for each in found.ways) + SWITCH_GAIN
+        assert way.cost < min(each.cost for each in step.ways) + SWITCH_GAIN
     assert sides[0] > 0 > sides[-1]
     changes = np.flatnonzero(np.diff(sides))
     assert len(changes) == 1 and np.linspace(-1.2, 1.2, 61)[changes[0]] > 0.05
+
+
+def test_ways_are_chosen_by_refined_plans_which_know_how_the_robot_moves() -> None:
+    """The search sees the same for both robots; one of them moves to the left already."""
+    person = szlib.Person((1.2, 0.0))
+    taken = {}
+    for vy in (0.0, 0.9):
+        controller = szlib.MPCCBF(ROUND, settings=AMONG)
+        step = controller.step((0.0, 0.0, 0.3, vy), (6.0, 0.0), [person])
+        costs = [way.cost for way in step.ways]
+        assert len(costs) == 2 and costs == sorted(costs)
+        taken[vy] = step.way
+    assert taken == {0.0: "right of person 0", 0.9: "left of person 0"}
+
+
+def test_a_way_whose_plan_violates_less_is_taken_though_it_is_longer() -> None:
+    """By priorities: a body counts more than any time, and so does a wall more than a body."""
+    short, long = (Way(np.zeros((2, 2)), np.zeros(2), cost) for cost in (5.0, 50.0))
+    assert short.rank() < long.rank() < short.rank((0.0, 0.1, 0.0))
+    assert long.rank((0.0, 0.3, 0.0)) < short.rank((0.1, 0.0, 0.0))
+    assert long.rank((0.1, 0.0, 0.0)) < short.rank((0.1, 0.2, 0.0))
+
+
+def test_the_way_that_is_kept_may_violate_and_cost_a_little_more() -> None:
+    other = Way(np.zeros((2, 2)), np.zeros(2), 5.0)
+    for more, is_better in ((SWITCH_GAIN - 0.1, True), (SWITCH_GAIN + 0.1, False)):
+        kept = other._replace(cost=other.cost + more, is_kept=True)
+        assert (kept.rank() < other.rank()) == is_better
+    kept = other._replace(is_kept=True)
+    assert kept.rank((0.0, SWITCH_DEPTH - 0.01, 0.0)) < other.rank()
+    assert other.rank() < kept.rank((0.0, SWITCH_DEPTH + 0.01, 0.0))
+
+
+def test_each_way_gets_a_plan_of_its_own_on_its_own_side(monkeypatch) -> None:
+    """The plans that are compared pass the person on the sides that their ways name."""
+    plans, plan = [], Planner.plan
+
+    def spy(planner: Planner, question: Question, *guesses: Array) -> Any:
+        plans.append((question, plan(planner, question, *guesses)))
+        return plans[-1][1]
+
+    monkeypatch.setattr(Planner, "plan", spy)
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
+    at = (-1.5, 0.0, 0.8, 0.0)
+    step = controller.step(at, (6.0, 0.0), [szlib.Person((0.0, 0.0))])
+    assert [way.name for way in step.ways] == ["right of person 0", "left of person 0"]
+    ends = [
+        build_horizon(AMONG).states(np.array(at), found.inputs)[-1, 1]
+        for _, found in plans
+    ]
+    assert len(ends) == 2 and ends[0] < -0.1 and ends[1] > 0.1
+    assert (step.inputs == plans[0][1].inputs).all()
 
 
 def test_a_zone_is_crossed_only_where_the_way_around_costs_more() -> None:
