@@ -46,7 +46,6 @@ from szlib.control.ways import (
     Map,
     Surroundings,
     Way,
-    WayFinder,
     _find_pairs,
     cross_layers,
     find_target,
