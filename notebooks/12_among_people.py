@@ -294,6 +294,10 @@ Markdown(
 # people. (Strictly, winding numbers tell *homology* classes. With two people or more, ways of one homology class may
 # differ in their homotopy class, but only if they go to and fro between people.) So szlib does not list them. It finds the cheapest way, raises the price near it, and searches
 # again, at most three times (after Bhattacharya, Likhachev and Kumar, 2012, who search in all classes).
+#
+# The search takes a robot that turns at once. The optimiser knows how the robot moves now. So it refines a plan along each
+# of these ways. The way is taken whose plan violates least, walls first, then bodies, then zones, and of these the cheapest one:
+# to the cost of the way comes the time that its plan loses.
 
 
 # %%
@@ -323,8 +327,8 @@ record.check(what, whole, f"{(between / 360).round().to_numpy().astype(int).toli
 #
 # **A robot that cannot decide.** Somebody stands to the right of the way, and shifts from one foot
 # to the other, by 0.3 m. Now the left is cheaper, now the right. A robot that always takes the cheapest way
-# goes to and fro. szlib's robot keeps its way until another one is `SWITCH_GAIN` = 1 s cheaper. This is
-# *hysteresis*, as in a thermostat.
+# goes to and fro. szlib's robot keeps its way until another one is `SWITCH_GAIN` = 1 s cheaper, or its plan violates
+# `SWITCH_DEPTH` = 0.05 m less. This is *hysteresis*, as in a thermostat.
 #
 # **What do you think?** How often does each robot change its mind in 12 s?
 

@@ -386,10 +386,13 @@ class Step:
 
     def _explain_other(self, way: Way) -> str:
         """Why another way is not taken."""
-        more = way.cost - self.ways[0].cost
+        taken = self.ways[0]
+        more = way.cost - taken.cost
         if more >= 0:
             return f"{way.name}, which costs {more:.1f} s more"
-        return f"{way.name}, which is only {-more:.1f} s cheaper than the way that it is on"
+        if taken.rank() < way.rank():
+            return f"{way.name}, which is only {-more:.1f} s cheaper than the way that it is on"
+        return f"{way.name}, whose plan would violate more"
 
     def _explain_stuck(self) -> str:
         """How far the goal is, and what holds the robot: the barriers that are at their limit."""

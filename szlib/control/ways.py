@@ -10,7 +10,9 @@ turns by about 2 pi more than the other (their winding numbers differ). In front
 walks are different sides, too. An optimiser that improves a plan in small steps never changes the side: each
 side needs a plan of its own. The next way is found where places near the ways before have a price.
 
-The robot keeps its way until another one is `SWITCH_GAIN` cheaper, so that it does not dither (hysteresis).
+The search does not know how the robot moves now. So a plan is refined along each way (`MPCCBF`), and the way
+is taken whose plan violates least, and of these the cheapest one. The robot keeps its way until another one
+is clearly better, so that it does not dither (hysteresis, see `Way.rank`).
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import tracemalloc
+from dataclasses import replace
 from itertools import pairwise
 from math import asin, atan2, cos, hypot, pi, sin
 from typing import Any
@@ -609,6 +610,27 @@ def test_the_way_that_is_kept_may_violate_and_cost_a_little_more() -> None:
     kept = other._replace(is_kept=True)
     assert kept.rank((0.0, SWITCH_DEPTH - 0.01, 0.0)) < other.rank()
     assert other.rank() < kept.rank((0.0, SWITCH_DEPTH + 0.01, 0.0))
+
+
+def test_explain_says_why_another_way_is_not_taken() -> None:
+    """It costs more; it is not much cheaper than the way that is kept; or its plan violates more."""
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
+    step = controller.step(
+        (-1.5, 0.0, 0.8, 0.0), (6.0, 0.0), [szlib.Person((0.0, 0.0))]
+    )
+    taken, other = step.ways
+    reasons = {}
+    for is_kept, more in ((False, 0.4), (True, -0.4), (False, -0.4), (True, -1.4)):
+        ways = (
+            taken._replace(is_kept=is_kept),
+            other._replace(cost=taken.cost + more),
+        )
+        reasons[is_kept, more] = replace(step, ways=ways).explain()
+    name = "not: left of person 0, "
+    assert f"{name}which costs 0.4 s more" in reasons[False, 0.4]
+    assert f"{name}which is only 0.4 s cheaper" in reasons[True, -0.4]
+    assert f"{name}whose plan would violate more" in reasons[False, -0.4]
+    assert f"{name}whose plan would violate more" in reasons[True, -1.4]
 
 
 def test_each_way_gets_a_plan_of_its_own_on_its_own_side(monkeypatch) -> None:
