@@ -328,7 +328,7 @@ record.check(what, whole, f"{(between / 360).round().to_numpy().astype(int).toli
 # **A robot that cannot decide.** Somebody stands to the right of the way, and shifts from one foot
 # to the other, by 0.3 m. Now the left is cheaper, now the right. A robot that always takes the cheapest way
 # goes to and fro. szlib's robot keeps its way until another one is `SWITCH_GAIN` = 1 s cheaper, or its plan violates
-# `SWITCH_DEPTH` = 0.05 m less. This is *hysteresis*, as in a thermostat.
+# `SWITCH_VIOLATION` = 0.05 m less. This is *hysteresis*, as in a thermostat.
 #
 # **What do you think?** How often does each robot change its mind in 12 s?
 

@@ -396,31 +396,27 @@ class MPCCBF(Controller):
         last = self._plan[0] if self._clock.has_begun else (0.0, 0.0)
         guesses = [self._plan + self._change]
         found = []
-        for heading in headings:
+        for k, heading in enumerate(headings):
             barriers = _shrink_zones(scene, heading)
             question = Question(state, heading.target, last, barriers)
-            if heading.is_searched:
-                targets = np.gradient(heading.ways[0].at(s.times), s.times, axis=0)[1:]
-                guesses.append(follow_velocities(s, state[2:], targets))
+            if not heading.is_searched:
+                return heading, question, self._planner.plan(question, *guesses)
+            way = heading.ways[0]
+            points = way.at(s.times)
+            targets = np.gradient(points, s.times, axis=0)[1:]
+            guesses.append(follow_velocities(s, state[2:], targets))
             plan = self._planner.plan(question, *guesses)
-            found.append((heading, question, plan))
+            lost = self._planner.find_time_lost(question, plan, points[1:])
+            way = way._replace(cost=way.cost + lost)
+            found.append((way.rank(plan.violations), k, way, question, plan))
             if plan.timed_out:
                 break
             guesses = []
-        if not headings[0].is_searched:
-            return found[0]
-        refined = []
-        for k, (heading, question, plan) in enumerate(found):
-            way = heading.ways[0]
-            promised = way.at(s.times[1:])
-            lost = self._planner.find_time_lost(question, plan, promised)
-            way = way._replace(cost=way.cost + lost)
-            refined.append((way.rank(plan.violations), k, way))
-        refined.sort()
-        ways = tuple(way for _, _, way in refined)
-        self._ways.keep(ways)
-        heading, question, plan = found[refined[0][1]]
-        return heading._replace(ways=ways), question, plan
+        _, numbers, ways, questions, plans = zip(*sorted(found), strict=True)
+        unrefined = [each.ways[0] for each in headings[k + 1 :]]
+        self._ways.ways = ways = (*ways, *unrefined)
+        heading = headings[numbers[0]]._replace(ways=ways)
+        return heading, questions[0], plans[0]._replace(timed_out=plan.timed_out)
 
     def _check(self, scene: Scene, inputs: Array) -> tuple[bool, bool, float]:
         """Whether the robot touches nothing fixed, and overlaps no body besides, and the least gap, to order.
@@ -525,7 +521,7 @@ class MPCCBF(Controller):
         if scene.tracked.unknown:
             time = max(abs(vx), abs(vy)) / s.a_max
             rest = x + vx * time / 2, y + vy * time / 2
-            return [headings[0]._replace(target=rest)]
+            return [headings[0]._replace(target=rest, is_searched=False)]
         if scene.people and not headings[0].ways:
             ((_, numbers, _),) = scene.zones.groups
             target = find_target(at, goal, numbers.tolist(), self._fixed, s)

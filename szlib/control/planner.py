@@ -97,7 +97,7 @@ class Plan(NamedTuple):
     inputs : accelerations, shape (N, 2) [m/s2].
     cost : with the prices of what is violated, before the last change if it converged.
     violations : if rows without a price contradict each other, the sums of the violations of walls, bodies
-        and zones [m]; else empty.
+        and zones, without those at a price [m]; else empty.
     is_relaxed : True if rows without a price contradict each other.
     timed_out : True if time was up before it converged.
     """
@@ -288,8 +288,8 @@ class Program:
         return bool(violated[self._is_hard | (self.prices[self.first :] == 0)].any())
 
     def sum_violations(self) -> tuple[float, ...]:
-        """Sums of the violations of walls, bodies and zones at the plan [m]."""
-        violated = self.lower[self.first :].clip(0.0)
+        """Sums of the violations of walls, bodies and zones without a price at the plan [m]."""
+        violated = self.lower[self.first :].clip(0.0) * (self.prices[self.first :] == 0)
         sums = np.bincount(self.levels, violated, len(Priority))[: Priority.DECAY]
         return tuple(sums.round(4).tolist())
 
@@ -382,17 +382,19 @@ class Planner:
             guess = plan.inputs
 
     def find_time_lost(self, question: Question, plan: Plan, points: Array) -> float:
-        """About the time that a `plan` loses against `points` at its times, with its prices [s].
+        """About the time that a `plan` loses, with its prices, against `points` at its times [s].
 
-        The points have the shape (N, 2). If the target of the `question` is far, the scaled cost grows each
-        second by 2 v_max times the sum of the weights of positions.
+        The points, shape (N, 2), count until they are nearest to the target, where the plan ends. A second is
+        v_max times the weights of x and y if the target is far, and less if it is near.
         """
         s = self.settings
-        weights = np.outer([*s.step_lengths[:-1], 0.0], s.Q[:2])
-        weights[-1] = s.P[:2]
+        weights = np.vstack([np.outer(s.step_lengths[:-1], s.Q[:2]), s.P[:2]])
+        offsets = points - question.target
+        nearest = np.hypot(*offsets.T).argmin()
+        offsets[nearest:] = offsets[nearest]
         distance = max(1.0, dist(question.state[:2], question.target))
-        promised = (weights * (points - question.target) ** 2).sum() / distance
-        return float((plan.cost - promised) / (s.v_max * max(weights.sum(), TOLERANCE)))
+        promised = (weights * offsets**2).sum() / distance
+        return float((plan.cost - promised) / s.v_max / (weights.sum() or 1.0))
 
     def _find_spare(self, question: Question, inputs: Array) -> Array:
         """By how much each obstacle is farther from a plan than what can matter, shape (n,) [m]."""
@@ -449,7 +451,7 @@ class Planner:
             solved = program.solve()
             if solved is None:
                 self._on_speed[:] = 0.0
-                return Plan(program.inputs.copy(), inf, (inf,), True, self.is_late)
+                return Plan(program.inputs.copy(), 0.0, (inf,), True, self.is_late)
             step, is_relaxed = solved
             if before is not None and step @ before < -(before @ before) / 2:
                 step = step / 2  # two plans would follow each other for ever

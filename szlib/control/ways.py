@@ -62,8 +62,9 @@ GROUP_SPEED = 0.3
 """Price of a second between people who are together [s]; how near [m] and alike [m/s] they are (assumed).
 People of a group that is given are together up to twice this distance."""
 SWITCH_GAIN = 1.0
-SWITCH_DEPTH = 0.05
-"""A way is kept until another one is this much cheaper [s], or violates so much less [m] (assumed)."""
+SWITCH_VIOLATION = 0.05
+"""A way is kept until another one is this much cheaper [s], or its plan violates a wall less, or bodies or
+zones by so much less in all its steps together [m] (assumed)."""
 MOST_WAYS = 3
 """Number of ways that are looked for (assumed)."""
 # the edge of a map is so far from its points, at least and at most [m]
@@ -120,9 +121,12 @@ class Way(NamedTuple):
     def rank(self, violations: Sequence[float] = ()) -> tuple[Any, ...]:
         """Of two ways the better one has the lesser rank: by `violations` of its plan [m], and then by cost.
 
-        The way that is kept may violate `SWITCH_DEPTH` and cost `SWITCH_GAIN` more.
+        They are those of walls, bodies and zones. The way that is kept may violate bodies and zones by
+        `SWITCH_VIOLATION` more, and cost `SWITCH_GAIN` more.
         """
-        counted = [max(0.0, each - SWITCH_DEPTH * self.is_kept) for each in violations]
+        allowed = 0.0, SWITCH_VIOLATION, SWITCH_VIOLATION
+        pairs = zip(violations, allowed, strict=False)
+        counted = [max(0.0, each - self.is_kept * more) for each, more in pairs]
         return counted if any(counted) else [], self.cost - SWITCH_GAIN * self.is_kept
 
     def at(self, times: Array) -> Array:
@@ -138,7 +142,7 @@ class Heading(NamedTuple):
     ----------
     target : the point that attracts it [m].
     length : of the way to the goal [m]; inf if there is none.
-    ways : those that were found, the one that is taken first.
+    ways : first the one along which the plan heads, then others that were found.
     is_searched : True if the ways were looked for in this step, not taken from one before.
     """
 
@@ -306,6 +310,10 @@ class WayFinder:
     ----------
     fixed : what is fixed.
     settings : of the robot.
+
+    Attributes
+    ----------
+    ways : those that were found last, the one that is taken first.
     """
 
     def __init__(self, fixed: Obstacles, settings: MPCSettings) -> None:
@@ -316,7 +324,7 @@ class WayFinder:
 
     def reset(self) -> None:
         """Forget the goal and the way."""
-        self._ways = list[Way]()
+        self.ways: Sequence[Way] = ()
         self._goal = (inf, inf)
         self._steps = 0
         self._ids = list[Hashable]()
@@ -329,7 +337,7 @@ class WayFinder:
     ) -> list[Heading]:
         """Along each way from `at` to the `goal` among `people` with these `zones`, or the one that is kept.
 
-        The first one is the best before its plan is known; `keep` takes another one.
+        The first one is the best before plans are known. The first of `ways` is kept.
         """
         if dist(goal, self._goal) > _GOAL_MOVED:
             self.reset()
@@ -349,13 +357,9 @@ class WayFinder:
             self._steps = ceil(SEARCH_INTERVAL / self._s.dt)
             self._ids = ids
         self._steps -= 1
-        chosen = range(len(self._ways) if is_searched else 1)
-        found = [self._head_for(m, at, self._ways[k:]) for k in chosen]
+        chosen = range(len(self.ways) if is_searched else 1)
+        found = [self._head_for(m, at, self.ways[k:]) for k in chosen]
         return [each._replace(is_searched=is_searched) for each in found]
-
-    def keep(self, ways: Sequence[Way]) -> None:
-        """Go on along the first one of these `ways`."""
-        self._ways = list(ways)
 
     def _make_map(self, points: Array, slack: float = 0.0) -> Map:
         """A new map that holds these `points`, with this `slack`."""
@@ -384,15 +388,15 @@ class WayFinder:
         if m.is_reached:
             m.end = np.array(goal)  # it may have moved a little
         before = np.array(inf)
-        if self._ways:
-            last = self._ways[0]
+        if self.ways:
+            last = self.ways[0]
             passed = last.times[np.hypot(*(last.points - at).T).argmin()]
             before = _find_turns(last, near.around, passed)
         found = [
             way._replace(is_kept=bool((np.abs(turns - before) <= pi).all()))
             for way, turns in self._find_ways(m, at, near)
         ]
-        self._ways = sorted(found, key=Way.rank)
+        self.ways = sorted(found, key=Way.rank)
 
     def _is_elsewhere(self, m: Map, goal: Point) -> bool:
         """True if the times of the map `m` are not those to the `goal`: it moved out of sight."""

@@ -40,7 +40,7 @@ from szlib.control.ways import (
     MOST_CELLS,
     SEARCH_TIME,
     SMALLEST_CELL,
-    SWITCH_DEPTH,
+    SWITCH_VIOLATION,
     SWITCH_GAIN,
     ZONE_SECOND,
     Heading,
@@ -608,8 +608,8 @@ def test_the_way_that_is_kept_may_violate_and_cost_a_little_more() -> None:
         kept = other._replace(cost=other.cost + more, is_kept=True)
         assert (kept.rank() < other.rank()) == is_better
     kept = other._replace(is_kept=True)
-    assert kept.rank((0.0, SWITCH_DEPTH - 0.01, 0.0)) < other.rank()
-    assert other.rank() < kept.rank((0.0, SWITCH_DEPTH + 0.01, 0.0))
+    assert kept.rank((0.0, SWITCH_VIOLATION - 0.01, 0.0)) < other.rank()
+    assert other.rank() < kept.rank((0.0, SWITCH_VIOLATION + 0.01, 0.0))
 
 
 def test_explain_says_why_another_way_is_not_taken() -> None:
