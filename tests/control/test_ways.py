@@ -40,13 +40,14 @@ from szlib.control.ways import (
     MOST_CELLS,
     SEARCH_TIME,
     SMALLEST_CELL,
-    SWITCH_VIOLATION,
     SWITCH_GAIN,
+    SWITCH_VIOLATION,
     ZONE_SECOND,
     Heading,
     Map,
     Surroundings,
     Way,
+    WayFinder,
     _find_pairs,
     cross_layers,
     find_target,
@@ -610,6 +611,125 @@ def test_the_way_that_is_kept_may_violate_and_cost_a_little_more() -> None:
     kept = other._replace(is_kept=True)
     assert kept.rank((0.0, SWITCH_VIOLATION - 0.01, 0.0)) < other.rank()
     assert other.rank() < kept.rank((0.0, SWITCH_VIOLATION + 0.01, 0.0))
+
+
+def test_a_wall_is_never_violated_for_the_way_that_is_kept() -> None:
+    way = Way(np.zeros((2, 2)), np.zeros(2), 5.0)
+    assert way.rank() < way._replace(is_kept=True).rank((0.01, 0.0, 0.0))
+
+
+def test_the_way_that_is_taken_is_kept_until_the_next_search() -> None:
+    """The search alone prefers the right, the plans the left: the next step knows that."""
+    person = [szlib.Person((1.2, 0.0))]
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
+    state = np.array([0.0, 0.0, 0.3, 0.9])
+    names = []
+    for _ in range(3):
+        step = controller.step(state, (6.0, 0.0), person)
+        names.append(step.way)
+        state = advance(state, step.control, AMONG.dt)
+    assert names == ["left of person 0"] * 3
+    found = WayFinder(Obstacles((), 0.3), AMONG)
+    zones = Obstacles.of([Zone(*Zone.place(ROUND, (1.2, 0.0), 0.0, (0, 0)))], AMONG)
+    first, _ = found.find((0.0, 0.0), (6.0, 0.0), person, zones)
+    assert first.ways[0].name == "right of person 0"
+
+
+def test_a_way_that_is_cheaper_is_left_if_its_plan_hits_somebody(monkeypatch) -> None:
+    """Violations of its plan are made up: the other way is taken then, at any cost."""
+    plan = Planner.plan
+
+    def hits_on_the_right(planner: Planner, question: Question, *guesses: Array) -> Any:
+        found = plan(planner, question, *guesses)
+        is_right = question.target[1] < 0
+        return found._replace(violations=(0.0, 0.3, 0.0) if is_right else ())
+
+    person = [szlib.Person((1.5, 0.3))]
+    at = (0.0, 0.0, 0.5, 0.0), (6.0, 0.0)
+    ways = szlib.MPCCBF(ROUND, settings=AMONG).step(*at, person).ways
+    assert [way.name for way in ways] == ["right of person 0", "left of person 0"]
+    monkeypatch.setattr(Planner, "plan", hits_on_the_right)
+    step = szlib.MPCCBF(ROUND, settings=AMONG).step(*at, person)
+    assert (
+        step.way == "left of person 0" and step.ways[0].cost > step.ways[1].cost + 0.5
+    )
+    assert "not: right of person 0, whose plan would violate more" in step.explain()
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5, 1.0])
+def test_the_time_that_a_plan_loses_hardly_depends_on_its_target(speed) -> None:
+    """A robot alone on a straight way sees less of it, or more."""
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
+    points = np.column_stack([AMONG.v_max * AMONG.times, 0 * AMONG.times])
+    lost = []
+    for x in (0.45, 1.0, 2.0, 4.0):
+        state = (0.0, 0.0, speed, 0.0)
+        question = Question(state, (x, 0.0), (0.0, 0.0), Obstacles((), 0.3))
+        plan = controller._planner.plan(question, np.zeros((AMONG.N, 2)))
+        promised = points[1:]
+        lost.append(controller._planner.find_time_lost(question, plan, promised))
+    assert min(lost) > 0.0 and max(lost) < 0.05 + 0.5 * (1 - speed)
+    assert lost == pytest.approx([lost[0]] * 4, abs=0.05 + 0.25 * (1 - speed))
+
+
+def test_a_wait_of_a_second_costs_about_a_second() -> None:
+    controller = szlib.MPCCBF(ROUND, settings=AMONG)
+    planner = controller._planner
+    question = Question(
+        (0.0, 0.0, 1.0, 0.0), (30.0, 0.0), (0.0, 0.0), Obstacles((), 0.3)
+    )
+    plan = planner.plan(question, np.zeros((AMONG.N, 2)))
+    points = np.column_stack([AMONG.v_max * AMONG.times, 0 * AMONG.times])[1:]
+    late = points - (1.0, 0.0)
+    more = planner.find_time_lost(question, plan, points)
+    less = planner.find_time_lost(question, plan, late)
+    assert more - less == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_step_says_that_time_was_up_while_another_way_was_refined(
+    monkeypatch,
+) -> None:
+    """The ways that were not refined are known all the same, and no plan is made after that."""
+    plan, made = Planner._plan_from, []
+
+    def late_from_the_third_on(planner: Planner, question: Question, guess: Array):
+        made.append(guess)
+        found = plan(planner, question, guess)
+        return found._replace(timed_out=len(made) >= 3)
+
+    monkeypatch.setattr(Planner, "_plan_from", late_from_the_third_on)
+    people = [szlib.Person((3.0, y)) for y in (-1.0, 0.0, 1.0)]
+    step = szlib.MPCCBF(ROUND, settings=AMONG).step(
+        (0.0, 0.0, 0.0, 0.0), (6.0, 0.0), people
+    )
+    assert step.timed_out and len(made) == 3
+    monkeypatch.undo()
+    usual = szlib.MPCCBF(ROUND, settings=AMONG).step(
+        (0.0, 0.0, 0.0, 0.0), (6.0, 0.0), people
+    )
+    assert {way.name for way in step.ways} == {way.name for way in usual.ways}
+
+
+def test_a_zone_that_is_entered_at_a_price_is_no_violation(monkeypatch) -> None:
+    """Else a way would be left for one that costs more, because of a zone that both enter."""
+    plan, found = Planner.plan, []
+
+    def spy(planner: Planner, question: Question, *guesses: Array) -> Any:
+        found.append(plan(planner, question, *guesses))
+        return found[-1]
+
+    monkeypatch.setattr(Planner, "plan", spy)
+    people = [(1.5 + 0.8 * k, 0.7 * (-1) ** k, -0.3, 0.0) for k in range(4)]
+    walls = [[(-1, side), (8, side)] for side in (-1.9, 1.9)]
+    controller = szlib.MPCCBF(ROUND, walls=walls, settings=AMONG)
+    state = np.array([0.0, 0.0, 0.8, 0.0])
+    for k in range(25):
+        moved = np.array(people)
+        moved[:, 0] -= 0.03 * k
+        state = advance(state, controller.step(state, (8.0, 0.0), moved).control, 0.1)
+    relaxed = [each.violations for each in found if each.is_relaxed]
+    assert max(body for _, body, _ in relaxed) > 0
+    assert {zone for _, _, zone in relaxed} == {0.0}
 
 
 def test_explain_says_why_another_way_is_not_taken() -> None:
