@@ -457,7 +457,7 @@ shares = crossing["mean"].loc[[*robots, "the person replaced"]].set_axis(known)
 shares.style.format("{:.1%}").set_caption("Ways on which a group was crossed, by what is known of groups")
 
 # %% [markdown]
-# The robot crosses a quarter as many groups as people do. Whether it knows of them does not matter here: all three rows
+# The robot crosses less than a quarter as many groups as people do. Whether it knows of them does not matter here: all three rows
 # are the same. Companions are mostly so near each other that their zones leave no room between them, which may be the
 # reason; a robot without zones was not tried. The search for ways has a price between two people of a group besides
 # (`szlib.control.ways.GROUP_SECOND`), for people who stand in a wide circle.
