@@ -480,8 +480,8 @@ class WayFinder:
 def _find_turns(way: Way, around: Array, since: float = 0.0) -> Array:
     """Angles by which a `way`, `since` a time [s] on, turns around places `around` it, shape (n,) [rad]."""
     seen = (way.at(since + _TIMES) - around) @ (1, 1j)
-    angles = np.unwrap(np.angle(seen))
-    return np.asarray(angles[:, -1] - angles[:, 0])
+    turns = np.angle(seen[:, 1:] * seen[:, :-1].conj())
+    return np.asarray(turns.sum(axis=1))
 
 
 class Surroundings:
@@ -618,10 +618,10 @@ def _name(m: Map, way: Way, near: Surroundings, turns: Array) -> str:
         offsets = points - places
         gaps = np.hypot(*offsets.T)
         k = gaps.argmin()
-        walk = np.gradient(places, _TICK, axis=0)[k]
         turn = turns[number]
         if abs(turn) < pi / 2 or gaps[k] > _NAMED_WITHIN:
             continue
+        walk = np.gradient(places, _TICK, axis=0)[k]
         side = "right of" if turn > 0 else "left of"
         ahead = walk @ offsets[k]
         if abs(ahead) > _ALONG * gaps[k] * max(np.hypot(*walk), STANDING_SPEED):
