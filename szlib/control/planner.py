@@ -382,7 +382,7 @@ class Planner:
             guess = plan.inputs
 
     def find_time_lost(self, question: Question, plan: Plan, points: Array) -> float:
-        """About the time that a `plan` loses, with its prices, against `points` at its times [s].
+        """About the time that a `plan` for a `question` loses against `points`, with its prices [s].
 
         The points, shape (N, 2), count until they are nearest to the target, where the plan ends. A second is
         v_max times the weights of x and y if the target is far, and less if it is near.
