@@ -732,6 +732,17 @@ def test_a_zone_that_is_entered_at_a_price_is_no_violation(monkeypatch) -> None:
     assert {zone for _, _, zone in relaxed} == {0.0}
 
 
+def test_among_unknown_people_no_way_is_forgotten() -> None:
+    """The robot brakes then: no plan along the ways is compared."""
+    known = [0.0, 0.0, 0.0, 0.0]
+    at = (-1.5, 0.0, 0.8, 0.0), (6.0, 0.0)
+    names = []
+    for people in ([known], [known, [np.nan, 0.0, 0.0, 0.0]]):
+        step = szlib.MPCCBF(ROUND, settings=AMONG).step(*at, np.array(people))
+        names.append([way.name for way in step.ways])
+    assert step.unknown == 1 and len(names[0]) == 2 and names[0] == names[1]
+
+
 def test_explain_says_why_another_way_is_not_taken() -> None:
     """It costs more; it is not much cheaper than the way that is kept; or its plan violates more."""
     controller = szlib.MPCCBF(ROUND, settings=AMONG)
