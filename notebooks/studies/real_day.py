@@ -6,11 +6,11 @@ numbers beside those of that line.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
 
-import nbformat
 from IPython.display import Markdown
 
 from szlib.workbook import folders
@@ -47,9 +47,8 @@ def read_numbers(copy: Path) -> dict[str, str]:
     """The numbers that an executed `copy` of a chapter on the plaza shows; none if there is no copy."""
     if not copy.exists():
         return {}
-    cells = nbformat.read(copy, as_version=4).cells
-    texts = [
-        out.get("data", {}).get("text/markdown", "") for cell in cells for out in cell.get("outputs", ())
-    ]
+    cells = json.loads(copy.read_text(encoding="utf-8"))["cells"]
+    shown = [out.get("data", {}) for cell in cells for out in cell.get("outputs", ())]
+    texts = ["".join(data.get("text/markdown", "")) for data in shown]
     lines = [text.removeprefix(BEGINS) for text in texts if text.startswith(BEGINS)]
     return dict(pair.split(": ", 1) for line in lines for pair in line.split("; "))

@@ -204,7 +204,7 @@ def _bank() -> Array:
 
 
 def respect_factor(
-    h: Array, f: Any, w: Any, excess: Any, reach: Any
+    h: Any, f: Any, w: Any, excess: Any, reach: Any
 ) -> tuple[Array, Array, Array, Array]:
     """g(h) (see `respect`), and what it is made of: the edge, the excess there, and max(h, 0) / c.
 

@@ -38,13 +38,13 @@ of noise at 10 Hz makes R 2 to 3 cm too small, of 10 cm 5 to 8 cm (9 and 15 cm w
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import permutations, product
 
 import numpy as np
 import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import expit
 from scipy.stats import chi2
 
@@ -67,9 +67,11 @@ _SOFTNESS = np.array([0.005, 0.02, 0.06, 0.12, 0.25])
 _IGNORING = np.array([0.0, *expit(np.linspace(-6, 4, 15))])
 _EXCESS = [(0.0, 1.0), *product((0.3, 1.0, 4.0, 16.0), (0.02, 0.08, 0.2, 0.5))]
 _MODEL_ERROR = 0.02  # [m]
-_FARTHEST = 0.8  # largest R, in r_max: beyond it people at a distance are hardly seen
-_N_RADII = 160  # values of R up to there
-_N_BINS = 80  # of r, up to r_max
+_STEPS = 400  # in r_max; in these steps are:
+_BIN = 5  # the width of a bin of r
+_BETWEEN = 2  # the distance between two values of R
+_FARTHEST = 320  # the end of R: beyond it people at a distance are hardly seen
+_N_BINS = _STEPS // _BIN
 _LEVEL = 0.95
 
 
@@ -147,38 +149,48 @@ class RespectRadius:
 
 def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
     """Fit the radius (see the top of this module) to `approaches` up to `r_max` [m]: `collect_approaches`."""
-    width = r_max / _N_BINS
-    r = (np.arange(_N_BINS) + 0.5) * width
-    is_seen = r > approaches["nearest"].min() - width
-    strata = list(_histograms(approaches, r_max))
+    step = r_max / _STEPS
+    is_seen = np.arange(1.5, _N_BINS + 1) * _BIN * step > approaches["nearest"].min()
+    strata = []  # histograms of data and null model, for each kind that both have
+    for _, of_kind in approaches.groupby("kind"):
+        is_real = of_kind["shift"] == 0
+        real, null = (
+            np.histogram(of_kind["nearest"][side], _N_BINS, (0, r_max))[0]
+            for side in (is_real, ~is_real)
+        )
+        if real.any() and null.any():
+            strata.append((real, null))
     if not strata:
         raise ZoneError(
             "no kind of encounter is in the data and in its null model as well: nothing to compare"
         )
     n, m = np.sum(strata, axis=(0, 2))
-    radii = np.arange(_N_RADII) / _N_RADII * _FARTHEST * r_max
-    h = r - radii[:, None, None, None]
-    softness = _SOFTNESS[:, None, None]
-    share = _IGNORING[:, None]
+    # h = r - R has few values: what depends on it is computed once, and seen from each R
+    radii = np.arange(0, _FARTHEST, _BETWEEN)[:, None, None] * step
+    h = (np.arange(1 - _FARTHEST, _STEPS)[:, None, None] + _BIN / 2) * step
     mean, spread = EXCESS_PRIOR
-    found: list[tuple[Array, Array]] = []  # by R, w and f
+    found = []  # by R, w and f
     for excess, reach in _EXCESS:
-        g, edge, *_ = respect_factor(h, share, softness, excess, reach)
+        factor, edge, *_ = respect_factor(
+            h, _IGNORING, _SOFTNESS[:, None], excess, reach
+        )
+        # An empty bin of the data counts nothing, even where g is 0 (0 log 0 would be NaN).
+        g, log_g, inside = (
+            sliding_window_view(each, _STEPS, axis=0)[::-_BETWEEN, ..., ::_BIN]
+            for each in (factor, np.log(factor + 1e-300), 1 - edge)
+        )
         likelihood, careless = np.zeros((2, *g.shape[:-1]))
         if excess:
             likelihood -= ((np.log(excess) - mean) / spread) ** 2 / 2
         for real, null in strata:
             expected = (null + 1e-3 * m / _N_BINS) * is_seen
             total = g @ expected
-            # An empty bin of the data counts nothing, even where g is 0 (0 log 0 would be NaN).
-            likelihood += np.log(g + 1e-300) @ real
-            likelihood -= real.sum() * np.log(total / expected.sum())
-            careless += share[:, 0] * ((1 - edge) @ expected) / total * real.sum() / n
+            likelihood += log_g @ real - real.sum() * np.log(total / expected.sum())
+            careless += _IGNORING * (inside @ expected) / total * real.sum() / n
         found.append((likelihood, careless))
     likelihood, careless = np.stack(found, axis=1)
     is_likely = 2 * (likelihood.max() - likelihood) <= chi2.ppf(_LEVEL, 1) * (1 + n / m)
-    is_zone = _IGNORING < 0.5
-    every = np.broadcast_to(radii[:, None, None] * is_zone, likelihood.shape)
+    every = np.broadcast_to(radii * (_IGNORING < 0.5), likelihood.shape)
     best = likelihood.argmax()
     at = every.flat[best]
     likely = every[is_likely]
@@ -192,20 +204,6 @@ def fit_radius(approaches: pd.DataFrame, r_max: float = R_MAX) -> RespectRadius:
         careless=float(careless.flat[best]),
         careless_high=float(careless[is_likely].max()),
     )
-
-
-def _histograms(
-    approaches: pd.DataFrame, r_max: float
-) -> Iterable[tuple[Array, Array]]:
-    """Histograms of data and null model over the distance, for each kind that both have."""
-    for _, of_kind in approaches.groupby("kind"):
-        is_real = of_kind["shift"] == 0
-        real, null = (
-            np.histogram(of_kind["nearest"][side], _N_BINS, (0, r_max))[0]
-            for side in (is_real, ~is_real)
-        )
-        if real.any() and null.any():
-            yield real, null
 
 
 @dataclass(frozen=True)

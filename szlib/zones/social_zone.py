@@ -417,6 +417,7 @@ class SocialZone:
         """
         fields = dict(vars(self))
         shape = fields.pop("shape")
+        verdicts = {v: self.verdict(v) for v in self.ellipses}
         content = {"format": FORMAT, "version": VERSION, "units": UNITS} | fields
         content |= {
             "ellipses": [
@@ -434,9 +435,7 @@ class SocialZone:
             ],
             "verdicts": [
                 {"speed": v, "verdict": verdict, "reasons": verdict.reasons}
-                for v, verdict in zip(
-                    self.ellipses, map(self.verdict, self.ellipses), strict=True
-                )
+                for v, verdict in verdicts.items()
             ],
             "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
         }
@@ -587,11 +586,11 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     counts = content["side_counts"]
     uncertainty = content["uncertainty"]
     test = content["null_test"]
-    if uncertainty is not None:
+    if uncertainty:
         for name in ("intervals", "bands"):
             uncertainty[name] = _table(uncertainty[name])
         uncertainty = Uncertainty(**uncertainty)
-    if test is not None:
+    if test:
         test["null_statistics"] = tuple(test["null_statistics"])
         test["respect"] = RespectRadius(**test["respect"])
         if test.get("sensor"):

@@ -113,7 +113,8 @@ def test_no_wall_is_touched_whatever_people_do_and_whatever_a_sensor_says(
     extra = (
         0.35 if name == "wheels" else 0.0
     )  # where the point ahead must be able to stop
-    while driven < 20:
+    worlds = 20 if name == UNUSUAL else 6  # tests/hostile/walls.py searches many more
+    while driven < worlds:
         world = draw_world(rng, radius + extra)
         if world is None:
             continue
@@ -136,7 +137,7 @@ def test_no_wall_is_touched_whatever_people_do_and_whatever_a_sensor_says(
             braked += step.status == "braking"
             own = controller.robot.advance(own, step.control, dt)
         driven += 1
-    assert verified > 60 and braked > 0
+    assert verified > 3 * worlds and braked > 0
 
 
 @pytest.mark.parametrize("name", ["default", "among people", "wheels"])
@@ -247,7 +248,7 @@ def test_the_robot_never_moves_towards_a_body_that_it_overlaps(name: str) -> Non
     rng, controller, found = np.random.default_rng(23), build(name), 0
     radius, dt = SETTINGS[name].r_robot, SETTINGS[name].dt
     bow = np.sqrt(2) * SETTINGS[name].a_max * dt**2 / 8
-    for _ in range(60):
+    for _ in range(25):
         controller.reset()
         own = controller.robot.start(np.zeros(4))
         for k in range(4):
@@ -267,7 +268,7 @@ def test_the_robot_never_moves_towards_a_body_that_it_overlaps(name: str) -> Non
                 assert moved[-1] <= 1e-6 and moved.max() <= bow, (k, step.explain())
             assert k or step.passively_safe, "from rest it can always stay"
             own = controller.robot.advance(own, step.control, dt)
-    assert found > 80
+    assert found > 40
 
 
 def test_bodies_that_overlap_and_bodies_that_do_not_are_bounded_number_by_number() -> (
@@ -301,7 +302,7 @@ def test_a_robot_that_rests_is_passively_safe_whoever_comes() -> None:
 
 def test_a_half_plane_belongs_to_the_promise() -> None:
     rng = np.random.default_rng(5)
-    for _ in range(12):
+    for _ in range(5):
         angle = rng.uniform(-np.pi, np.pi)
         normal = np.array([np.cos(angle), np.sin(angle)])
         edge = HalfPlane(-0.7 * normal, normal)

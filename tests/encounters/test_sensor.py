@@ -67,7 +67,7 @@ def test_tracks_that_break_anywhere_are_no_lost_people():
 
 def test_lost_people_are_noticed_where_tracks_break_everywhere():
     """Then tracks end beside others less than twice as often as elsewhere."""
-    for seed, every in enumerate((0.8, 1.2, 1.6, 2.5, 4.0)):
+    for seed, every in enumerate((0.8, 1.6, 4.0)):
         rng = np.random.default_rng(seed)
         rows = crowds.as_table(crowds.singles(rng, 1400, 1800))
         broken = crowds.broken(rows, rng, every)
