@@ -111,7 +111,15 @@ class Unicycle:
         move = rect(v * dt * np.sinc(half / pi), theta + half)
         x = x + move.real
         y = y + move.imag
-        return np.array([x, y, (theta + 2 * half + pi) % (2 * pi) - pi, v, omega])
+        return np.array(
+            [
+                x,
+                y,
+                (theta + 2 * half + pi) % (2 * pi) - pi,
+                v,
+                omega,
+            ]
+        )
 
 
 @dataclass(frozen=True)

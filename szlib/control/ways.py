@@ -80,11 +80,27 @@ _NEAR_WAY = 3  # cells that are near a way are at most so many steps from it
 _EVERY = 20  # turns are measured around so many cells that are not free, one of
 _MOST_SHARE = 1.2  # least offset of obstacles, in cells: no step leads across a wall
 _NEIGHBOURS = np.array(
-    [(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)]
+    [
+        (0, 1),
+        (1, 0),
+        (1, 1),
+        (1, -1),
+        (1, 2),
+        (2, 1),
+        (1, -2),
+        (2, -1),
+    ]
 )
 # price of a step to a neighbour: a robot that waits stands still [s]
 _MOVE_PRICE = 0.015
-_MOVES = _MOVE_PRICE * np.array([[2, 1, 2], [1, 0, 1], [2, 1, 2]], np.float32)
+_MOVES = _MOVE_PRICE * np.array(
+    [
+        [2, 1, 2],
+        [1, 0, 1],
+        [2, 1, 2],
+    ],
+    np.float32,
+)
 _NAMED_WITHIN = 2.5  # people who are passed nearer than this are named [m]
 _ALONG = 0.4  # cosine of the angle from a walk within which one is in front or behind
 _DOOR = 1.0  # a place is narrow if no free disc of this radius holds it [m]

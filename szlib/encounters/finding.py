@@ -248,7 +248,12 @@ def select_near(
     box = as_area(area).grown(REACH + _POSITION_ROUNDING)
     t, x, y = map(pl.col, "txy")
     # on the inner side of each edge
-    inner = [x >= box.x[0], x <= box.x[1], y >= box.y[0], y <= box.y[1]]
+    inner = [
+        x >= box.x[0],
+        x <= box.x[1],
+        y >= box.y[0],
+        y <= box.y[1],
+    ]
     times = {str(k): pl.when(each).then(t) for k, each in enumerate(inner)}
     margin = 2 * max_gap + VELOCITY_SPAN + _TIME_ROUNDING
     spans = (

@@ -202,7 +202,14 @@ class AttentionalSpace:
         """The four corners in the reference pedestrian's frame, shape (4, 2) [m]."""
         near, far = self.ahead
         side = self.width / 2
-        return np.array([(near, -side), (far, -side), (far, side), (near, side)])
+        return np.array(
+            [
+                (near, -side),
+                (far, -side),
+                (far, side),
+                (near, side),
+            ]
+        )
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether points `x` ahead and `y` to the left of the person [m] lie inside or on the border."""

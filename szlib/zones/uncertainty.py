@@ -230,7 +230,17 @@ def estimate_uncertainty(
 def _quantities(ellipses: Array) -> Array:
     """`QUANTITIES` of ellipses (..., 5), and their reach in each of `DIRECTIONS`, shape (..., 6 + 72)."""
     m, n, a, b, angle = np.moveaxis(ellipses, -1, 0)
-    numbers = np.stack([m, n, a, b, np.degrees(angle), np.pi * a * b], axis=-1)
+    numbers = np.stack(
+        [
+            m,
+            n,
+            a,
+            b,
+            np.degrees(angle),
+            np.pi * a * b,
+        ],
+        axis=-1,
+    )
     return np.concatenate([numbers, ellipse_reach(ellipses)], axis=-1)
 
 
