@@ -72,19 +72,29 @@ def find_stopping_path(state: Sequence[float], inputs: Array, s: MPCSettings) ->
     inputs : the first k accelerations of a plan, shape (k, 2) [m/s2].
     s : settings: the lengths of the steps, and a_max.
     """
-    held = s.dt * np.array(s.step_lengths[: len(inputs)])
-    velocities = np.vstack([state[2:], held[:, None] * inputs]).cumsum(axis=0)
-    last = velocities[-1]
-    fastest = np.abs(last).max()
+    # complex numbers: places x + i y, and velocities; Python's own, because they are few
+    x, y, *velocity = state
+    v = complex(*velocity)
+    steps = []
+    for m, control in zip(s.step_lengths, inputs.tolist(), strict=False):
+        v += s.dt * m * complex(*control)
+        steps.append((s.dt * m, v))
+    fastest = max(abs(v.real), abs(v.imag))
     piece = s.dt * max(1, ceil(fastest / s.a_max / s.dt / _MOST_PIECES))
     n = ceil(fastest / s.a_max / piece - 1e-9)  # none at rest
-    slower = np.maximum(1 - np.arange(1, n + 1) * s.a_max * piece / fastest, 0.0)
-    velocities = np.vstack([velocities, slower[:, None] * last])
-    lengths = np.append(held, np.full_like(slower, piece))
-    moved = lengths[:, None] * (velocities[1:] + velocities[:-1]) / 2
-    points = np.vstack([state[:2], moved]).cumsum(axis=0)
-    bows = np.hypot(*(velocities[1:] - velocities[:-1]).T) * lengths / 8
-    return Path(points, np.append(0.0, lengths).cumsum(), bows)
+    slower = (max(1 - k * s.a_max * piece / fastest, 0.0) for k in range(1, n + 1))
+    steps += [(piece, share * v) for share in slower]
+    v = complex(*velocity)
+    points = [complex(x, y)]
+    times = [0.0]
+    bows = []
+    for length, after in steps:
+        points.append(points[-1] + length * (v + after) / 2)
+        times.append(times[-1] + length)
+        bows.append(length * abs(after - v) / 8)
+        v = after
+    places = np.array(points).view(float).reshape(-1, 2)
+    return Path(places, np.array(times), np.array(bows))
 
 
 class DoubleIntegrator:

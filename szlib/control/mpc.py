@@ -442,7 +442,8 @@ class MPCCBF(Controller):
 
         It brakes at once, or after one step with `control`. It goes no farther than `reach`: the way to brake
         at once is less than |v| dt / 4 longer than after any control, and to brake in steps adds less than
-        a_max dt^2 / 4. `_room` is where the gap to the nearest wall was last measured, and that gap.
+        a_max dt^2 / 4. A person is far if the whole line is, on which they walk until then. `_room` is where
+        the gap to the nearest wall was last measured, and that gap.
         """
         s, (x, y, vx, vy), (ax, ay) = self._s, scene.state, control.tolist()
         at = x, y
@@ -459,7 +460,10 @@ class MPCCBF(Controller):
             self._room = at, float(gaps.min(initial=inf))
         contact = BODY_RADIUS + self._settings.r_robot + reach
         for person in scene.people:
-            if dist(person.position, at) - contact < time * hypot(*person.velocity):
+            offset = complex(*person.position) - complex(*at)
+            walk = time * complex(*person.velocity)
+            share = -(offset * walk.conjugate()).real / (abs(walk) ** 2 or 1.0)
+            if abs(offset + max(0.0, min(share, 1.0)) * walk) < contact:
                 return walls, find_bodies(scene.zones, self.settings)
         return walls, bodies
 
@@ -469,13 +473,14 @@ class MPCCBF(Controller):
 
     def _bound_bodies(self, bodies: Obstacles, path: Path) -> Bound:
         """How near the disc comes to `bodies`, or towards those that it overlaps, while it moves."""
+        bound = bodies.bound(path)
         begin = path.points[0]
         moved = path.points - begin
-        if np.hypot(*moved.T).max() <= AT_REST * self._s.dt:
+        if bound.is_safe or np.hypot(*moved.T).max() <= AT_REST * self._s.dt:
             return Bound()
         overlaps = bodies.gaps(*begin) < -TOLERANCE
         if not overlaps.any():
-            return bodies.bound(path)
+            return bound
         bound = bodies.select_near(np.where(overlaps, inf, 0.0)).bound(path)
         offsets = bodies.groups[0].numbers[overlaps, :2] - begin
         towards = float((offsets @ moved.T).max())

@@ -15,7 +15,7 @@ import shapely
 import szlib
 from szlib.control import Body, HalfPlane, Obstacles, advance
 from szlib.control.controller import find_stopping_path
-from szlib.control.obstacles import Group, Path
+from szlib.control.obstacles import Group, Path, find_bodies
 
 ZONE = szlib.Ellipse((-0.05, 0.017), (1.084, 0.625), -0.28)
 BODY = 0.25
@@ -288,6 +288,25 @@ def test_bodies_that_overlap_and_bodies_that_do_not_are_bounded_number_by_number
     assert alone.lower < -0.02 and alone.seen > 0.1
     assert neared == pytest.approx((-0.01, -0.01))
     assert both == pytest.approx((alone.lower, -0.01))
+
+
+@pytest.mark.parametrize("name", ["default", "among people"])
+def test_people_who_are_left_out_of_the_check_cannot_be_touched(name: str) -> None:
+    rng, controller, far = np.random.default_rng(1), build(name), 0
+    s = controller.settings
+    for _ in range(1000):
+        velocity, control = rng.uniform(-1, 1, (2, 2)) * [[s.v_max], [s.a_max]]
+        places, walks = rng.uniform(-3, 3, (2, 2)), rng.uniform(-1.6, 1.6, (2, 2))
+        people = [szlib.Person(tuple(places[i]), tuple(walks[i])) for i in range(2)]
+        scene = controller._ask((0.0, 0.0, *velocity), (5.0, 5.0), people)
+        _, near = controller._find_near(scene, control)
+        if near.groups:
+            continue
+        far += 1
+        for inputs in (control[None], np.zeros((0, 2))):
+            path = find_stopping_path(scene.state, inputs, s)
+            assert find_bodies(scene.zones, s).bound(path).is_safe
+    assert far > 300
 
 
 def test_a_robot_that_rests_is_passively_safe_whoever_comes() -> None:
