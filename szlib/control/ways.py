@@ -535,6 +535,14 @@ class Surroundings:
         walls = m.centers(np.argwhere(~m.free[self.window]) + self.low)
         walls = walls[::_EVERY, None].repeat(len(_TIMES), axis=1)
         places = find_places(people, _TIMES)
+        i, j = _find_pairs(places, [each.group for each in people])
+        apart = np.hypot(*(places[i, 0] - places[j, 0]).T)[:, None, None] / 2
+        reach = [BODY_RADIUS + s.r_robot + s.body_gap, *apart.flat]
+        for _, numbers, offsets in zones.groups:
+            xa, ya, xb, yb, a, px, py = numbers.T[:7]
+            middle = np.hypot((xa + xb) / 2 - px, (ya + yb) / 2 - py)
+            reach += [*(middle + a + offsets)]
+        size = min(size, ceil(max(reach) / m.cell))
         x, y = m.cell * np.mgrid[-size : size + 1, -size : size + 1]
         prices = np.zeros((len(people), *x.shape))
         for kind, numbers, offsets in zones.groups:
@@ -542,9 +550,7 @@ class Surroundings:
             d = kind.distance(table[5] + x, table[6] + y, 0.0, *table)
             prices[d < offsets[:, None, None]] = ZONE_SECOND
         prices[:, np.hypot(x, y) < BODY_RADIUS + s.r_robot + s.body_gap] = BODY_SECOND
-        i, j = _find_pairs(places, [each.group for each in people])
-        apart = np.hypot(*(places[i, 0] - places[j, 0]).T)[:, None, None]
-        between = GROUP_SECOND * (np.hypot(x, y) < apart / 2)
+        between = GROUP_SECOND * (np.hypot(x, y) < apart)
         self._prices = np.concatenate([prices, between]).astype(np.float32)
         self._map = m
         self.people = places
@@ -601,18 +607,21 @@ def cross_layers(costs: Any, begin: Any, far: Array) -> Array:
     within[0, *begin] = 0.0
     for layer, cost, after in zip(layers, costs, within[1:], strict=False):
         moved = np.minimum(layer[:-2], layer[2:]) + _MOVE_PRICE
-        across = np.minimum(layer[1:-1], moved)
-        moved = np.minimum(across[:, :-2], across[:, 2:]) + _MOVE_PRICE
-        after[:] = np.minimum(across[:, 1:-1], moved) + cost
-    ends = within + far
-    inside = np.pad(far[1:-1, 1:-1] > 0, 1)
-    ends[:-1, inside] = inf
-    k, *last = map(int, np.unravel_index(ends.argmin(), ends.shape))
-    cells = [np.array(last)]
+        beside = np.minimum(layer[1:-1], moved)
+        moved = np.minimum(beside[:, :-2], beside[:, 2:]) + _MOVE_PRICE
+        after[:] = np.minimum(beside[:, 1:-1], moved) + cost
+    edge = far.copy()
+    edge[1:-1, 1:-1][far[1:-1, 1:-1] > 0] = inf
+    ends = within + edge
+    ends[-1] = within[-1] + far
+    k, i, j = map(int, np.unravel_index(ends.argmin(), ends.shape))
+    cells = [(i, j)]
     for layer in layers[:k][::-1]:
-        i, j = cells[-1]
         near = layer[i : i + 3, j : j + 3]
-        cells.append(cells[-1] + np.divmod((near + _MOVES).argmin(), 3) - 1)
+        along, across = divmod(int((near + _MOVES).argmin()), 3)
+        i += along - 1
+        j += across - 1
+        cells.append((i, j))
     return np.array(cells[::-1])
 
 
