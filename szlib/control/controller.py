@@ -283,7 +283,8 @@ class StepClock:
             return []
         period = median_low(periods)
         off = min(abs(period - dt), abs(periods[-1] - dt))
-        is_even = max(periods) - min(periods) < RATE_ERROR * period
+        near = [each for each in periods if abs(each - period) < RATE_ERROR * period]
+        is_even = len(near) > RATE_STEPS / 2
         if off <= RATE_ERROR * dt or (is_timed and not is_even):
             return []
         return [

@@ -225,7 +225,7 @@ class Obstacle:
     Notes
     -----
     `distance` must not change by more than the robot and the obstacle move, and should be convex: then plans
-    of a few iterations keep it.
+    of a few iterations keep it. What moves has the priority `BODY` or `ZONE`, and gives its `speeds`.
 
     Examples
     --------
@@ -265,15 +265,20 @@ class Obstacle:
         self.numbers = tuple(given.tolist())
 
     def check(self) -> None:
-        """Raise SolverError if `distance` cannot be computed for many places at once."""
+        """Raise SolverError if `distance` cannot be computed for many places, or a wall moves."""
         try:
             with np.errstate(all="ignore"):
-                np.reshape(self.distance(*np.ones((3, 2)), *self.numbers), 2)
+                places = np.array([(1, 1, -3, -3), (1, 1, 2, 2), (0.0, 1, 0, 1)])
+                now, then = np.reshape(self.distance(*places, *self.numbers), (2, 2)).T
         except (TypeError, ValueError, NotImplementedError) as error:
             raise SolverError(
                 f"{self}: `distance` must be a formula of x, y, t and {len(self.numbers)} numbers, by "
                 f"operators only: {error!r}"
             ) from error
+        stands = self.priority > Priority.WALL or np.array_equal(now, then, True)
+        check_argument(
+            stands, "priority of what moves", self, "BODY or ZONE: walls stand still"
+        )
 
     @staticmethod
     def distance(x: Any, y: Any, t: Any, *numbers: Any) -> Any:

@@ -412,7 +412,7 @@ class Tracker:
         if late:
             fault = (
                 f"people were measured {max(abs(now - time) for time in late):.3g} s from now, and are "
-                f"remembered for {self.memory:g} s only"
+                f"remembered for {self.memory:g} s only; what helps: `now` by the clock of `stamps`"
             )
         return TrackedPeople(tuple(present), rejected, unknown, fault)
 

@@ -179,8 +179,9 @@ class MPCSettings:
         """The paper's controller to the letter (eq. 2, sec. 4), with `changes` by name.
 
         A margin of 5 cm around every wall, no rule of the side, no guard, no time limit. The paper does not
-        give gamma, Q, R, P and a_max: they are szlib's, as is what happens if a step has no solution. The
-        paper's solver, IPOPT, finds the same plans (notebook 08).
+        give gamma, Q, R, P and a_max: they are szlib's. Where a step has no solution, the plan violates walls
+        as little as it can, then bodies, zones, and the decay (`szlib.control.planner`). The paper's solver,
+        IPOPT, finds the same plans (notebook 08).
 
         Examples
         --------

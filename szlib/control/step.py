@@ -228,7 +228,7 @@ class Step:
     def violations(self) -> dict[Priority, float]:
         """Largest violation by the plan of the conditions of each `Priority` [m]: see `control.planner`."""
         worst = dict.fromkeys(Priority, 0.0)
-        for level, _, _, values in self._rows:
+        for level, _, _, values, _ in self._rows:
             if level is not None:
                 worst[level] = max(worst[level], -float(values.min()))
         return worst
@@ -310,11 +310,13 @@ class Step:
         if not self.feasible:
             return "its plan is not feasible"
         if (then < -TOLERANCE).any():
-            return f"it comes too close to {scene.name(int(then.argmin()))}"
+            return f"it comes too close to {scene.name(int(then.argmin()))}; what helps: a larger eps"
         if not barriers.bound(path).is_safe:
-            return "its disc may overlap a body or a wall"
+            return "its disc may overlap a body or a wall; what helps: a larger eps or body_gap"
         h = scene.zones.bound(path, is_barrier=True).lower + scene.settings.eps
-        return "" if h >= -TOLERANCE else "it may enter a zone on its way"
+        if h < -TOLERANCE:
+            return "it may enter a zone on its way; what helps: a larger eps"
+        return ""
 
     def carry(self, way: Sampled) -> Sampled:
         """The `way` of the disc, from that of the point which is planned for; here it is the same."""
@@ -351,6 +353,8 @@ class Step:
                 f"  the plan violates {report.worst.name} by {report.slack:.2g}",
                 f"  what helps: {self._advise(report.worst)}",
             ]
+        elif (self.h < -TOLERANCE).any():
+            lines.append("  what helps: nothing now, the plan leads out again")
         lines += self._list_notes()
         return "\n".join(lines + [f"  WRONG: {fault}" for fault in report.faults])
 
@@ -376,8 +380,9 @@ class Step:
             "helps: another goal": scene.goal_blocked,
             "there is no way to the goal, so the robot goes to the nearest point that it can reach; what "
             "helps: another goal": self.way_length == inf,
-            f"{self.rejected} measurements of people were rejected; {self.unknown} are "
-            "unknown": self.rejected > 0,
+            f"{self.rejected} measurements of people were rejected; {self.unknown} are unknown; what helps: "
+            "finite numbers, and ids, by which people are remembered": self.rejected
+            > 0,
             f"no progress for {self.stuck:.1f} s, {self._explain_stuck()}": self.stuck
             > 0,
             self.clock: bool(self.clock),

@@ -18,7 +18,7 @@ import shapely
 
 from ..core.checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
-from .obstacles import PaperWall, Priority, Wall, Zone
+from .obstacles import HalfPlane, PaperWall, Priority, Wall, Zone
 from .settings import TOLERANCE, MPCSettings
 
 # Two computations of one number may differ by this much, or by a share of the largest number.
@@ -55,17 +55,19 @@ class Rows(NamedTuple):
     kind : of the obstacles; "speed" or "end" for the speed limit and rest at the end.
     first : number of the first obstacle.
     values : negative where a row is violated, shape (obstacles, k) [as of `Row`].
+    is_floor : True if it joins only with a `decay_price`, or where barrier conditions contradict each other.
     """
 
     level: Priority | None
     kind: str
     first: int
     values: Array
+    is_floor: bool = False
 
     def is_hard(self, s: MPCSettings) -> bool:
         """True if no price can buy a violation, by the settings `s`."""
         if self.level is None or s.decay_price == inf:
-            return self.level in (None, Priority.DECAY)
+            return not self.is_floor
         return self.level < Priority.ZONE + (s.zone_price == inf)
 
 
@@ -86,10 +88,10 @@ def list_rows(scene: Any, x: Array, h: Array, gaps: Array) -> Iterator[Rows]:
             yield Rows(Priority.DECAY, kind.kind, first, falls[:, : s.N_h])
             is_fixed = kind.priority == Priority.WALL
             then = then - stop**lengths * now if is_fixed else then[:, : s.N_h]
-        yield Rows(kind.priority, kind.kind, first, then)
+        yield Rows(kind.priority, kind.kind, first, then, kind.has_barrier)
         first += len(offsets)
     if len(gaps):
-        yield Rows(Priority.BODY, "body", 0, gaps[:, 1:])
+        yield Rows(Priority.BODY, "body", 0, gaps[:, 1:], is_floor=True)
     velocity = x[1:, 2:]
     slower = s.v_max**2 - (velocity**2).sum(axis=1)
     yield Rows(None, "speed", 0, slower[None])
@@ -186,6 +188,10 @@ def verify_step(step: Any) -> Report:
         faults.append(
             f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
         )
+    if step.status == "optimal" and slack > TOLERANCE + tolerance:
+        faults.append(
+            f"the step says that its plan is optimal; it violates {worst.name}"
+        )
     faults += _check_guard(step, s.dt * lengths)
     return Report(tuple(faults), worst, slack, feasible, safe)
 
@@ -231,21 +237,23 @@ def _check_guard(step: Any, lasts: Array) -> Iterator[str]:
         points, times, _ = step.carry(_sample(*asked, s))
         gaps = _measure(scene, points, times, as_predicted=False)
         touches = np.asarray((gaps < -TOLERANCE).any(axis=1))
-        if n == 1 and step.walls_safe and touches[levels == Priority.WALL].any():
-            yield "the step says that it can stop before every wall; it cannot"
+        if n == 1:
+            stops = not touches[levels == Priority.WALL].any()
         moved = points[::PIECES] - points[0]
         nearer = ((places - points[0]) @ moved.T > TOLERANCE).any(axis=1)
         overlaps = gaps[: len(places), 0] < -TOLERANCE
         is_hit: Array = np.where(overlaps, nearer, touches[: len(places)])
         rests = np.hypot(*(points - points[0]).T).max() <= AT_REST * s.dt
         is_clear.append(bool(rests or not is_hit.any()))
-    if step.passively_safe and not any(is_clear):
+    if step.walls_safe and not stops:
+        yield "the step says that it can stop before every wall; it cannot"
+    if step.passively_safe and not (stops and any(is_clear)):
         yield "the step says that it rests before somebody walks into it; it does not"
 
 
 def _find_worst(scene: Any, rows: Iterable[Rows]) -> Row:
     """The row without a price that has the smallest value."""
-    level, kind, first, values = min(rows, key=lambda each: float(each.values.min()))
+    level, kind, first, values, _ = min(rows, key=lambda each: float(each.values.min()))
     i, k = np.unravel_index(values.argmin(), values.shape)
     name = {"speed": "the speed limit", "end": "rest"}.get(kind, "")
     if level is not None:
@@ -276,6 +284,10 @@ def _measure(
             if is_barrier:
                 facing = person.heading or 0.0
                 measured = _measure_zone(offset, facing, scene.person_zones[i]) - growth
+        elif type(each) is HalfPlane:
+            normal = complex(*each.numbers[2:])
+            seen = points @ (1, 1j) - complex(*each.numbers[:2])
+            measured = (seen * normal.conjugate()).real
         elif type(each) in (Wall, PaperWall):
             is_paper = is_barrier and isinstance(each, PaperWall)
             measured = _measure_wall(points, each, is_paper)

@@ -19,13 +19,12 @@ from laboratory import plot_admissible_controls
 from studies.ipopt import ByIpopt
 
 import szlib
-from szlib.control import HalfPlane, Obstacle, Obstacles, Wall, Zone
+from szlib.control import HalfPlane, Obstacle, Obstacles, Priority, Wall, Zone
 from szlib.control.controller import advance, find_stopping_path
 from szlib.control.obstacles import (
     Body,
     PaperWall,
     Path,
-    Priority,
     barrier,
     cbf_residual,
     describe,
@@ -679,3 +678,30 @@ def test_new_walls_and_obstacles_hold():
     with pytest.raises(szlib.SolverError, match="an obstacle must be an Obstacle"):
         controller.obstacles = [3]
     assert len(controller.obstacles) == 1 and len(controller.walls) == 0
+
+
+@pytest.mark.parametrize("level", [Priority.WALL, Priority.BODY, Priority.ZONE])
+def test_a_row_without_a_barrier_is_a_row_of_the_plan(level):
+    class Rug(Obstacle):
+        priority = level
+        has_barrier = False
+
+        @staticmethod
+        def distance(x, y, t, px, py, radius):
+            return ((x - px) ** 2 + (y - py) ** 2) ** 0.5 - radius
+
+    controller = szlib.MPCCBF(ZONE, obstacles=[Rug(1.3, 0.0, 0.3)])
+    step = controller.step((0, 0, 1, 0), (5, 0))
+    assert step.violations[level] == pytest.approx(step.slack) and step.slack > 0.01
+    assert not step.feasible and not step.safe
+    assert step.verify().ok and "the plan violates" in step.explain()
+
+
+def test_what_moves_is_no_wall():
+    class Gate(Obstacle):
+        @staticmethod
+        def distance(x, y, t, px, py, vx, vy):
+            return ((x - px - t * vx) ** 2 + (y - py - t * vy) ** 2) ** 0.5
+
+    with pytest.raises(szlib.SolverError, match="walls stand still"):
+        szlib.MPCCBF(ZONE, obstacles=[Gate(1.0, 0.0, -1.5, 0.0)])

@@ -116,6 +116,9 @@ def test_calls_at_another_rate_without_a_time_are_reported(monkeypatch, period):
     assert f"steps come every {period:g} s, not every dt = 0.1 s" in steps[-1].clock
     assert "give `now`, or call every dt" in steps[-1].clock
     assert steps[-1].clock in steps[-1].explain() and steps[4].clock == ""
+    uneven = np.diff(np.random.default_rng(0).uniform(-0.2, 0.2, 61)) + 1
+    steps = call_each(monkeypatch, period * uneven)
+    assert sum(bool(step.clock) for step in steps) > 30
 
 
 def test_calls_every_dt_or_as_fast_as_a_simulation_are_not_reported(monkeypatch):

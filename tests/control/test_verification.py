@@ -78,7 +78,8 @@ def test_the_report_imports_no_formula_of_the_controller():
         for alias in node.names
     }
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    own = {"Array", "BODY_RADIUS", "TOLERANCE", "Ellipse", "PaperWall", "Wall", "Zone"}
+    own = {"Array", "BODY_RADIUS", "TOLERANCE", "Ellipse", "HalfPlane"}
+    own |= {"PaperWall", "Wall", "Zone"}
     own |= {"MPCSettings", "Priority"}
     assert taken & names <= own, "types and constants, no formula"
 
@@ -368,3 +369,25 @@ def test_braking_is_checked_in_the_steps_in_which_the_robot_brakes(dt):
         assert way.times[::n] == pytest.approx(path.times)
         assert way.points[::n] == pytest.approx(path.points)
         assert way.states[-1, 2:] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_step_that_contradicts_itself_is_a_fault():
+    walls = [[(-20.0, 0.0), (20.0, 0.0)]]
+    step = controller_of(walls=walls).step((0, 0.65, 0.3, -0.9), (0, 5))
+    assert not step.walls_safe
+    (fault,) = replace(step, passively_safe=True).verify().faults
+    assert "rests" in fault
+    relaxed = controller_of().step((0, 0, 0.9, 0), (5, 0), [[1.2, 0, -1, 0]])
+    assert relaxed.slack > 0.01
+    (fault,) = replace(relaxed, status="optimal").verify().faults
+    assert "optimal" in fault
+
+
+def test_a_half_plane_is_measured_again(monkeypatch):
+    wrong = staticmethod(lambda x, y, t, px, py, nx, ny: (y - py) * ny + 2)
+    monkeypatch.setattr(HalfPlane, "distance", wrong)
+    settings = szlib.MPCSettings(eps=0.0501)  # what CasADi compiles is kept for these
+    edge = HalfPlane((0.0, 0.0), (0.0, 1.0))
+    controller = szlib.MPCCBF(ZONE, obstacles=[edge], settings=settings)
+    step = controller.step((0, 0.2, 0, 0), (3, 0.2))
+    assert step.walls_safe and not step.verify().ok
