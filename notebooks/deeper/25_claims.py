@@ -27,7 +27,7 @@
 # measured with its 95 % interval, and the verdict is "supported", "not supported" or "not decidable".
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [24](24_data_quality.ipynb) · next: [26 - Eleven
+# [Start](../00_start_here.ipynb) · before: [24](24_data_quality.ipynb) · next: [26 - Named
 # meetings](26_meetings.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 35 min · needs
 # [06](../06_respect.ipynb)
 #

@@ -20,7 +20,7 @@
 # ---
 
 # %% [markdown]
-# # 26 - Eleven meetings
+# # 26 - Named meetings
 #
 # **Question.** Robots that drive among people are tested in named meetings: head-on, in a doorway, around a
 # corner. Where is this controller good, and where is it bad?

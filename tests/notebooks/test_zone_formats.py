@@ -93,3 +93,12 @@ def test_latex_needs_no_jinja(zone, monkeypatch):
         f"{zone.ellipses[v].semi_axes[0]:.2f}" for v in (0.9, 1.1, 1.3)
     ]
     assert not re.search(r"(?<!\\)[%#_]", as_latex(zone))
+
+
+def test_a_reference_zone_is_written_as_well():
+    hall = szlib.reference_zone("hall")
+    (feature,) = json.loads(as_geojson(hall))["features"]
+    assert feature["properties"]["semi_major"] == 1.2
+    (layer,) = yaml.safe_load(as_ros_params(hall))["/**"]["ros__parameters"].values()
+    assert layer["speeds"] == [1.1] and layer["verdict"] == ["undecided"]
+    assert layer["radius"] == [1.2]
