@@ -1,11 +1,10 @@
-"""Other sites than the ATC mall: Grand Central, Edinburgh's Informatics Forum; and groups of people.
+"""Other sites than the ATC mall: Grand Central; and groups of people.
 
 Each reader returns a track table, as does `szlib.read_tracks`, which reads EWAP (ETH, hotel, zara, students) and
 THOR-MAGNI itself.  These data are not shipped: they have no licence, or one of their own.
 
     site            sampled every   max_gap   what else to know
     Grand Central   0.8 s           0.9 s     marked by hand, 7-16 cm off; its scale is uncertain
-    Edinburgh       1/9 s           0.5 s     about 9 frames/s; the centres of blobs, not of people
     THOR-MAGNI      0.4 s           0.9 s     a laboratory of 18 m by 7 m, where people were given goals
     EWAP            0.4 s           0.9 s     ETH at 15 frames/s, the others at 25
     ATC 1 Hz        1.0 s           1.6 s
@@ -19,7 +18,6 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -30,17 +28,11 @@ from szlib.core.errors import DataError, warn
 from szlib.core.input_files import read_small, reading
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
-from szlib.tracks.readers import check_names
-from szlib.tracks.recipe import Recipe
 from szlib.tracks.shapes import read_magni_rows
 
 # frames a second of the video of Grand Central; every 20th is annotated
 GRAND_CENTRAL_RATE = 25.0
 GRAND_CENTRAL_SCALE = 0.8  # metres in one unit of its homography (OpenTraj)
-EDINBURGH_RATE = 9.0  # approximate frames a second of Edinburgh's files; the rate varies over short times
-# metres in a pixel on the floor, and rows of an image
-EDINBURGH_PIXEL, EDINBURGH_ROWS = (0.0247, 480)
-_TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE)
 
 
 def read_grand_central(
@@ -92,52 +84,7 @@ def read_grand_central(
         }
     )
     raw[["x", "y"]] = GRAND_CENTRAL_SCALE * floor[:, :2] / floor[:, 2:]
-    return _finish(raw, path.name, max_gap, {})
-
-
-def read_edinburgh(
-    paths: str | Path | Iterable[str | Path],
-    *,
-    frame_rate: float = EDINBURGH_RATE,
-    max_gap: float = 0.5,
-) -> pd.DataFrame:
-    """Read the Edinburgh Informatics Forum (Majecka, 2009): ``TRACK.Rn=[[x y frame];[x y frame];...];``.
-
-    Parameters
-    ----------
-    paths : a file, or several, each a recording called by its name ("tracks.Aug24").
-    frame_rate : frames a second; about 9, the files do not say more.
-    max_gap : a longer silence ends a track [s].
-
-    Returns
-    -------
-    A track table; id is the number of the track, x [m] points to the right of the image and y up.  A blob
-    that the tracker gave to several tracks is kept in the first one only.
-
-    Raises
-    ------
-    DataError : there is no such file, it has no track, or a track does not hold triples of numbers.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from studies.sites import read_edinburgh
-    >>> _ = Path("tracks.Aug24.txt").write_text("TRACK.R1=[[601 23 9];[595 24 10];[589 25 11]];")
-    >>> read_edinburgh("tracks.Aug24.txt")[["day", "id", "t"]]
-                day  id    t
-    0  tracks.Aug24   1  1.0
-    1  tracks.Aug24   1  1.1
-    2  tracks.Aug24   1  1.2
-    """
-    files = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
-    if not files:
-        raise DataError("no file of Edinburgh was given; pass at least one path")
-    Recipe(frame_rate=frame_rate)  # checks the rate
-    check_names([file.stem for file in files])
-    parts, n_repeated = zip(*(_read_edinburgh_file(file, frame_rate) for file in files), strict=True)
-    name = files[0].name if len(files) == 1 else f"{len(files)} files"
-    reasons = {"a blob of an earlier track": sum(n_repeated)}
-    return _finish(pd.concat(parts, ignore_index=True), name, max_gap, reasons)
+    return _finish(raw, path.name, max_gap)
 
 
 def read_groups(path: str | Path) -> pd.DataFrame:
@@ -272,48 +219,16 @@ def _annotations(path: Path) -> dict[str, bytes]:
     return found
 
 
-def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, int]:
-    """Detections of one file without repeated blobs, and the number of these."""
-    with reading(path, "as text", "a file of Edinburgh's tracks"):
-        tracks = _TRACK.findall(path.read_text(encoding="utf-8"))
-    if not tracks:
-        raise DataError(
-            f"{path}: holds no track; expected lines like TRACK.R1=[[601 23 4471];[595 24 4472]];"
-        )
-    parts = []
-    for number, points in tracks:
-        try:
-            rows = np.array(re.sub(r"[\[\];,]", " ", points).split(), float).reshape(-1, 3)
-        except ValueError as error:
-            raise DataError(f"{path}, TRACK.R{number}: expected triples of x, y, frame ({error})") from error
-        parts.append(np.column_stack([np.full(len(rows), int(number)), rows]))
-    columns = np.concatenate(parts).T
-    blobs = pd.DataFrame(dict(zip(("id", "column", "row", "frame"), columns, strict=True)))
-    repeated = blobs.duplicated(["column", "row", "frame"]) & ~blobs.duplicated()
-    blobs = blobs[~repeated]
-    raw = pd.DataFrame(
-        {
-            "day": path.stem,
-            "id": blobs["id"].astype(int),
-            "t": blobs["frame"] / frame_rate,
-        }
-    )
-    raw["x"] = EDINBURGH_PIXEL * blobs["column"]
-    raw["y"] = EDINBURGH_PIXEL * (EDINBURGH_ROWS - blobs["row"])
-    return raw, int(repeated.sum())
-
-
-def _finish(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]) -> pd.DataFrame:
-    """The track table of rows from which some were `rejected` before."""
+def _finish(raw: pd.DataFrame, name: str, max_gap: float) -> pd.DataFrame:
+    """The track table of the rows that can be used."""
     finite = np.isfinite(raw[["t", "x", "y"]].to_numpy(float)).all(axis=1)
     doubled = raw.duplicated(["day", "id", "t"]).to_numpy() & finite
     usable = raw[finite & ~doubled].reset_index(drop=True)
     if len(usable) == 0:
         raise DataError(f"{name}: holds no row that can be used")
     reasons = {
-        **rejected,
         "not finite": int((~finite).sum()),
         "second position at a time": int(doubled.sum()),
     }
-    stage = funnels.stage(f"read {name}", len(raw) + sum(rejected.values()), len(usable), reasons)
+    stage = funnels.stage(f"read {name}", len(raw), len(usable), reasons)
     return to_clock(funnels.attach(usable, [stage]), max_gap=max_gap)

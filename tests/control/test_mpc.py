@@ -72,7 +72,10 @@ def test_after_a_reset_the_same_states_give_the_same_steps():
         np.linspace((-4, 0.2, 0, 0), (-3, 0, 0.8, 0), 6),
     )
     first = [controller.step(x, GOAL, [FACING]).control for x in states]
-    controller.step((0, 5, 0, 0), (9, 9))
+    walker = replace(FACING, position=(-2, 1), heading=2.0, id="a")
+    controller.step((0, 5, 0, 0), (9, 9), [walker])
+    controller.reset()
+    assert not controller.step((-4, 0, 0, 0), GOAL).scene.people, "they are forgotten"
     controller.reset()
     assert np.array_equal(
         first, [controller.step(x, GOAL, [FACING]).control for x in states]

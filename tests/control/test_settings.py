@@ -115,11 +115,6 @@ def test_a_gamma_rate_lets_h_fall_equally_fast_whatever_dt_is(dt: float) -> None
         settings.with_gamma_rate(-1)
 
 
-def test_something_that_is_no_settings_is_refused():
-    with pytest.raises(szlib.SolverError, match=r"settings must be MPCSettings, such"):
-        szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), settings="among_people")
-
-
 def test_a_number_of_steps_that_the_grid_overrules_is_refused():
     for counts in ({"N": 20}, {"N_h": 3}):
         with pytest.raises(szlib.SolverError, match="because `grid` sets them"):

@@ -193,12 +193,6 @@ def test_a_single_tick_has_no_velocity() -> None:
 # --- gaps and funnel ---------------------------------------------------------------------------------
 
 
-def test_gaps_are_not_interpolated() -> None:
-    t = np.r_[np.arange(0, 2, 0.04), np.arange(2.9, 4, 0.04), np.arange(4.3, 5, 0.04)]
-    ticks = np.rint(to_clock(make_raw(t), max_gap=0.5)["t"] * 10).astype(int)
-    assert set(ticks) == {*range(20), *range(29, 50)}
-
-
 @pytest.mark.parametrize("begin", [0.0, BEGIN, BEGIN + 0.007, BEGIN + 0.013])
 @pytest.mark.parametrize(("gap", "bridged"), [(0.5, True), (0.501, False)])
 def test_a_gap_of_exactly_max_gap_is_interpolated(
@@ -265,7 +259,9 @@ def test_the_same_id_on_two_days_is_two_people() -> None:
             make_raw([0.2, 0.3], 5, day="2012-10-28"),
         ]
     )
-    assert to_clock(raw)["x"].tolist() == [0, 0, 5, 5]
+    tracks = to_clock(raw)
+    assert tracks["x"].tolist() == [0, 0, 5, 5]
+    assert not tracks[["vx", "vy"]].abs().gt(0).any(axis=None), "nobody moved"
 
 
 # --- bad input ---------------------------------------------------------------------------------------
@@ -308,11 +304,6 @@ def test_max_gap_below_one_tick_is_refused(max_gap: float) -> None:
         szlib.DataError, match=r"max_gap must be longer than the clock's 0.1 s"
     ):
         to_clock(make_raw([0, 0.1]), max_gap=max_gap)
-
-
-def test_a_given_max_gap_is_used() -> None:
-    assert len(to_clock(make_raw([0, 8.0, 16.0]), max_gap=10)) == 161
-    assert len(to_clock(make_raw([0, 8.0, 16.0]), max_gap=7)) == 3
 
 
 @pytest.mark.parametrize(

@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING, Any
 from .client import Verdict, check
 
 if TYPE_CHECKING:
-    from .sheets import SHEETS, case, hint, plot, sheet_minutes
+    from .sheets import SHEETS, case, hint, plot
     from .task import ESSAY_MINUTES, Task
 
 _PLACES = {"ESSAY_MINUTES": "task", "Task": "task"}
-_NAMES = ("SHEETS", "case", "hint", "plot", "sheet_minutes", *_PLACES)
+_NAMES = ("SHEETS", "case", "hint", "plot", *_PLACES)
 
 
 def __getattr__(name: str) -> Any:

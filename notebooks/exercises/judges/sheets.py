@@ -82,11 +82,6 @@ def hint(name: str, number: int = 1) -> None:
     print(f"hint {number} of {len(hints)}: {hints[number - 1]}")
 
 
-def sheet_minutes(sheet: str) -> int:
-    """Minutes that a sheet takes: its tasks and its essay."""
-    return ESSAY_MINUTES + sum(task.minutes for task in SHEETS[sheet])
-
-
 def find_task(name: str) -> Task:
     """The task of this name."""
     if name not in TASKS:
