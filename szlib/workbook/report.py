@@ -3,8 +3,8 @@
 The summary of a run is also text for a terminal, and JUnit XML for services that run tests.
 
 nbconvert, with which Jupyter itself exports, makes the page. The template and the renderer of this module
-draw formulas as MathML, and fold the code. The outputs of notebooks that an earlier run left in the folder are
-shown as they are, with their scripts: run in no folder that somebody else made.
+draw formulas as MathML, and fold the code. The outputs of notebooks that an earlier run left in the folder
+are shown as they are, with their scripts: run in no folder that somebody else made.
 """
 
 from __future__ import annotations
