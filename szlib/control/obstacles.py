@@ -36,14 +36,7 @@ SHORTEST_WALL = 1e-3
 KNOT = 4  # numbers of each interval of a prediction
 
 
-def _project(
-    x: Any,
-    y: Any,
-    xa: Any,
-    ya: Any,
-    xb: Any,
-    yb: Any,
-) -> tuple[Any, ...]:
+def _project(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> tuple[Any, ...]:
     """Length of the segment (`xa`, `ya`) to (`xb`, `yb`), and g of (`x`, `y`) and its place along [m].
 
     The place is measured from the middle (paper, eq. 3).
@@ -70,15 +63,7 @@ def euclidean_segment_formula(x: Any, y: Any, *ends: Any) -> Any:
     return (g**2 + ((abs(beyond) + beyond) / 2) ** 2) ** 0.5
 
 
-def ellipse_formula(
-    x: Any,
-    y: Any,
-    xa: Any,
-    ya: Any,
-    xb: Any,
-    yb: Any,
-    a: Any,
-) -> Any:
+def ellipse_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any, a: Any) -> Any:
     """Approximate distance of (`x`, `y`) to an ellipse [m] (paper, eq. 7).
 
     The foci are (`xa`, `ya`) and (`xb`, `yb`), the semi-major axis is `a`.

@@ -189,9 +189,7 @@ def verify_step(step: Any) -> Report:
             f"the step says feasible {step.feasible}, safe {step.safe}; found {feasible}, {safe}"
         )
     if step.status == "optimal" and slack > TOLERANCE + tolerance:
-        faults.append(
-            f"the step says that its plan is optimal; it violates {worst.name}"
-        )
+        faults.append(f"the status is optimal; the plan violates {worst.name}")
     faults += _check_guard(step, s.dt * lengths)
     return Report(tuple(faults), worst, slack, feasible, safe)
 
